@@ -7,7 +7,7 @@ use crate::watch::{Line, Watchers, watched};
 use harness::case::{Fault, Step, StepField};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray1};
 use peri::Error;
-use peri::bonds::{Bonds, VolumeCorrection};
+use peri::bonds::{BodyGeometry, VolumeCorrection};
 use peri::calibrate::Calibration;
 use peri::critical::Convention;
 use peri::geometry::{Cut, Shape};
@@ -90,7 +90,7 @@ impl<const D: usize> AnyBody for Built<D> {
         let watch = |_: &Status| if line.stop().load(Ordering::Relaxed) { Err(stopped()) } else { Ok(()) };
         let finished = |state: &State<D>| {
             let (Some(positions), Some(record)) = (&positions, state.history.last()) else { return Ok(()) };
-            if state.round > 0 {
+            if state.control.round > 0 {
                 return Ok(());
             }
             let field = |name, data| StepField { name, unit: "m", components: D, data };

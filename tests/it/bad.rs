@@ -1,7 +1,7 @@
 //! Malformed and absurd input: exit code 2, the message that helps, nothing written, no panic.
 //!
-//! A scene in `tests/bad/` (of `peri`) or `tests/bad-parts/` (of `crystfem`) says itself what it must be told: each leading `# expect: TEXT` is a part of the message;
-//! the line at fault ends in `# <- here`.
+//! Each scene is a patch of a valid one, with its fault and its message: `tests/bad/peri.txt` and `crystfem.txt`, whose heads tell how they
+//! are read; the valid scenes are in `tests/bad/peri/` and `crystfem/`.
 
 use crate::program::{Ended, command, executable, finish, peri, workspace};
 use crate::scenes;
@@ -12,49 +12,115 @@ const MARK: &str = "# <- here";
 
 #[test]
 fn every_bad_scene_gets_its_message() {
-    judge_all("peri", "tests/bad", 100);
+    judge_all("peri", 275);
 }
 
 #[test]
 fn every_bad_scene_of_a_part_gets_its_message() {
-    judge_all("crystfem", "tests/bad-parts", 60);
+    judge_all("crystfem", 118);
 }
 
-fn judge_all(program: &str, folder: &str, least: usize) {
-    let folder = workspace().join(folder);
-    let mut names: Vec<String> = fs::read_dir(&folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-        .collect();
-    names.retain(|name| name.ends_with(".toml"));
-    names.sort();
-    let failures: Vec<String> = names.iter().filter_map(|name| judge(program, &folder, name).err()).collect();
-    assert!(names.len() >= least, "only {} scenes", names.len());
-    assert!(failures.is_empty(), "{} of {}:\n{}", failures.len(), names.len(), failures.join("\n"));
+/// A scene with one fault.
+pub struct BadScene {
+    pub name: String,
+    pub text: String,
+    /// Parts of its message.
+    expected: Vec<String>,
 }
 
-fn judge(program: &str, folder: &Path, name: &str) -> Result<(), String> {
-    let text = fs::read_to_string(folder.join(name)).unwrap();
-    let expected: Vec<&str> = text.lines().map_while(|line| line.strip_prefix("# expect: ")).collect();
+/// Reads the patches of a program and writes their scenes, and the files that they name, to a folder.
+pub fn write_bad_scenes(program: &str, folder: &Path) -> Vec<BadScene> {
+    let bad = workspace().join("tests/bad");
+    for files in ["clouds", "inputs"] {
+        fs::create_dir(folder.join(files)).unwrap();
+        for file in fs::read_dir(bad.join(files)).unwrap().map(|entry| entry.unwrap()) {
+            fs::copy(file.path(), folder.join(files).join(file.file_name())).unwrap();
+        }
+    }
+    let table = fs::read_to_string(bad.join(program).with_extension("txt")).unwrap();
+    let entries = table.split("\n= ").skip(1).map(|entry| {
+        let mut lines = entry.lines();
+        let head = lines.next().unwrap_or_default();
+        let (name, base) = head.split_once(" of ").unwrap_or((head, ""));
+        let base = match base {
+            "" => String::new(),
+            base => fs::read_to_string(bad.join(program).join(base).with_extension("toml")).unwrap(),
+        };
+        let (expected, patch): (Vec<&str>, Vec<&str>) = lines.partition(|line| line.starts_with("? "));
+        let expected = expected.into_iter().map(|line| line[2..].to_owned()).collect();
+        let text =
+            patched(&base, &patch).unwrap_or_else(|line| panic!("{name}: `{line}` is not in its base"));
+        let text = text.replace("../../", &format!("{}/", workspace().display()));
+        fs::write(folder.join(format!("{name}.toml")), &text).unwrap();
+        BadScene { name: name.to_owned(), text, expected }
+    });
+    entries.collect()
+}
+
+/// Applies a patch; its error is the line that is not in the base.
+fn patched(base: &str, patch: &[&str]) -> Result<String, String> {
+    let mut rest = base.lines();
+    let mut scene: Vec<&str> = Vec::new();
+    if patch.first().is_some_and(|line| line.starts_with('+')) {
+        scene.extend(rest.by_ref());
+    }
+    for line in patch.iter().filter(|line| !line.is_empty()) {
+        let (kind, line) = (&line[..1], line.get(2..).unwrap_or_default());
+        if kind != "+" {
+            let unmarked = line.strip_suffix(MARK).map_or(line, str::trim_end);
+            loop {
+                match rest.next() {
+                    Some(other) if other == unmarked => break,
+                    Some(other) => scene.push(other),
+                    None => return Err(line.to_owned()),
+                }
+            }
+        }
+        if kind != "-" {
+            scene.push(line);
+        }
+    }
+    scene.extend(rest);
+    Ok(scene.iter().map(|line| format!("{line}\n")).collect())
+}
+
+fn judge_all(program: &str, count: usize) {
+    let folder = tempfile::tempdir().unwrap();
+    let scenes = write_bad_scenes(program, folder.path());
+    assert_eq!(scenes.len(), count);
+    // the fault is in the patch
+    for base in fs::read_dir(workspace().join("tests/bad").join(program)).unwrap() {
+        let text = fs::read_to_string(base.unwrap().path()).unwrap();
+        let text = text.replace("../../", &format!("{}/", workspace().display()));
+        fs::write(folder.path().join("base.toml"), text).unwrap();
+        finish(command(program, "check base.toml", folder.path()).spawn().unwrap()).with_code(0);
+    }
+    let failures: Vec<String> =
+        scenes.iter().filter_map(|scene| judge(program, folder.path(), scene).err()).collect();
+    assert!(failures.is_empty(), "{} of {}:\n{}", failures.len(), scenes.len(), failures.join("\n"));
+}
+
+fn judge(program: &str, folder: &Path, scene: &BadScene) -> Result<(), String> {
+    let BadScene { name, text, expected } = scene;
     let fault = |what: String| Err(format!("{name}: {what}"));
     if expected.is_empty() {
-        return fault("has no `# expect:`".into());
+        return fault("has no message".into());
     }
     let temporary = tempfile::tempdir().unwrap();
     let output = temporary.path().join("out");
     let verb = |arguments: String| finish(command(program, &arguments, folder).spawn().unwrap());
-    let check = verb(format!("check {name}"));
-    let run = verb(format!("run {name} --output {}", output.display()));
+    let check = verb(format!("check {name}.toml"));
+    let run = verb(format!("run {name}.toml --output {}", output.display()));
     for (verb, ended) in [("check", &check), ("run", &run)] {
         if ended.code != Some(2) || !ended.stdout.is_empty() {
             return fault(format!("{verb}: exit code {:?}, prints `{}`", ended.code, ended.stdout));
         }
         let message = ended.message();
-        if let Some(missing) = expected.iter().find(|&&part| !message.contains(part)) {
+        if let Some(missing) = expected.iter().find(|part| !message.contains(part.as_str())) {
             return fault(format!("{verb}: `{missing}` is not in\n{}", ended.stderr));
         }
         let mark = text.lines().position(|line| line.ends_with(MARK));
-        let place = mark.map_or(format!("[{name}:"), |line| format!("[{name}:{}:", line + 1));
+        let place = mark.map_or(format!("[{name}.toml:"), |line| format!("[{name}.toml:{}:", line + 1));
         if !message.contains(&place) {
             return fault(format!("{verb}: `{place}` is not in\n{}", ended.stderr));
         }

@@ -18,7 +18,7 @@ fn help_of_every_command() {
         .take_while(|line| !line.is_empty())
         .filter_map(|line| line.split_whitespace().next())
         .collect();
-    for name in ["run", "resume", "check", "exact", "bench", "completions"] {
+    for name in ["run", "resume", "check", "exact", "completions"] {
         assert!(names.contains(&name), "{names:?}");
     }
     for name in names.iter().filter(|&&name| name != "help") {
@@ -94,8 +94,7 @@ fn inputs_of_mdsurrogate_that_cannot_be_used() {
     let ended = run("check scene.toml").with_code(2);
     ended.tells("data.files[0]");
     ended.tells("none.csv");
-    for line in ["info none.csv", "export none.safetensors out/law", "bench none.safetensors", "md run none"]
-    {
+    for line in ["info none.csv", "export none.safetensors out/law", "md run none"] {
         run(line).with_code(2).tells("none");
     }
     let law = "version = 1\nprogram = \"mdsurrogate\"\ntitle = \"law\"\n[data]\nfiles = [\"rows.csv\"]\n[split]\nby = \"random\"\n\

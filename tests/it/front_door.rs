@@ -5,6 +5,7 @@
 //! takes that many, new ones every time. What it finds is kept in tests/proptest-regressions and tried first.
 
 use crate::allocations;
+use crate::bad::write_bad_scenes;
 use crate::program::workspace;
 use harness::scene::Source;
 use proptest::prelude::*;
@@ -236,7 +237,9 @@ fn attack_files(kind: &str, files: &[PathBuf], name: &str, open: impl Fn(&Path) 
 #[test]
 fn scenes_of_peri() {
     let mut files = cases("peri");
-    files.extend(below("tests/bad", ".toml").into_iter().filter(|file| file.is_file()));
+    let folder = tempfile::tempdir().unwrap();
+    let bad = write_bad_scenes("peri", folder.path());
+    files.extend(bad.iter().map(|scene| folder.path().join(format!("{}.toml", scene.name))));
     attack_scenes(&files, |source| {
         let scene = source.parse::<peri::program::scene::Scene>()?;
         peri::program::observe::check(source, &scene, false).map(|_| ())

@@ -1,7 +1,7 @@
 //! Whole-program tests: they run the released command lines as a user does, and know nothing of their insides (but
 //! [`front_door`], which takes the readers by themselves).
 //!
-//! * [`bad`]: malformed and absurd scenes in `tests/bad/`, each with the message it must get;
+//! * [`bad`]: malformed and absurd scenes, patches in `tests/bad/`, each with the message it must get;
 //! * [`commands`]: exit codes, help, closed forms, reports and files;
 //! * [`harness`]: what all programs have: the same commands, and sweeps;
 //! * [`bits`]: the same bits on any number of threads;

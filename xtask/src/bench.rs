@@ -4,6 +4,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+pub use evidence::measurement::Measurement as Row;
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
 use polycore::file::atomic_write;
 use serde::{Deserialize, Serialize};
@@ -27,29 +28,15 @@ mod surrogate;
 #[derive(clap::Args)]
 pub struct Options {
     /// `langevin`, `peri-laws`, `peri-peers` (beside LAMMPS), `peri-solvers [-- MM,MM…]`, `crystfem [-- PART… N,N…]`
-    /// (its brick beside CalculiX and scikit-fem), `mdsurrogate` (its training and answers beside PyTorch and onnxruntime), or a program with a `bench --json`.
+    /// (its brick beside CalculiX and scikit-fem), `mdsurrogate` (its training and answers beside PyTorch and onnxruntime), or a crate with a
+    /// `benches/measure.rs`.
     name: String,
     /// Print the rows as JSON.
     #[arg(long)]
     json: bool,
-    /// Passed on to that program after `bench --json`; spacings of `peri-solvers`; parts and edges of `crystfem`.
+    /// Options of `benches/measure.rs`; spacings of `peri-solvers`; parts and edges of `crystfem`.
     #[arg(last = true)]
     arguments: Vec<String>,
-}
-
-/// One number.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Row {
-    /// What was measured.
-    pub what: String,
-    /// Of how many things: points, particles.
-    pub size: u64,
-    /// On how many threads.
-    pub threads: usize,
-    /// The number; absent where there is none.
-    pub value: Option<f64>,
-    /// Its unit, empty for a ratio.
-    pub unit: String,
 }
 
 /// target/bench/NAME.json.
@@ -79,7 +66,7 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
             (rows, table, true)
         }
         "peri-peers" => peri_peers::run(workspace, &folder)?,
-        "crystfem" => {
+        "crystfem" if !options.arguments.iter().any(|argument| argument.starts_with('-')) => {
             // writes the rows of each part
             let (rows, table, passed) = crystfem::run(workspace, &folder, &options.arguments)?;
             if options.json {
@@ -94,7 +81,7 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
             (rows, table, true)
         }
         "peri-laws" => {
-            let rows = external(&workspace.release("peri")?, &["--laws".to_owned()])?;
+            let rows = external(&workspace.bench("peri")?, &["--laws".to_owned()])?;
             let table = text(&rows);
             (rows, table, true)
         }
@@ -104,15 +91,21 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
             (rows, table, true)
         }
         program => {
-            let rows = external(&workspace.release(program)?, &options.arguments)?;
+            let rows = external(&workspace.bench(program)?, &options.arguments)?;
             let table = text(&rows);
             (rows, table, true)
         }
     };
-    // a program's subcommand has a file of its own: crystfem-kinetics.json
-    let what = options.arguments.first().filter(|word| !word.starts_with('-') && !options.name.contains('-'));
-    let name = what.map_or_else(|| options.name.clone(), |what| format!("{}-{what}", options.name));
-    let path = write(workspace, &name, &rows)?;
+    // a part with options of its own is not what the report shows
+    if options.name == "crystfem" {
+        print(&if options.json {
+            serde_json::to_string_pretty(&rows).into_diagnostic()? + "\n"
+        } else {
+            table
+        });
+        return Ok(passed);
+    }
+    let path = write(workspace, &options.name, &rows)?;
     if options.json {
         print(&(serde_json::to_string_pretty(&rows).into_diagnostic()? + "\n"));
     } else {
@@ -121,22 +114,22 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     Ok(passed)
 }
 
-/// Runs `PROGRAM bench --json ARGUMENTS`, which prints the rows as a JSON list.
+/// Runs the measurements of a crate ([`Workspace::bench`]), which print rows as a JSON list.
 fn external(program: &Path, arguments: &[String]) -> Result<Vec<Row>> {
     let output = Command::new(program)
-        .args(["bench", "--json"])
         .args(arguments)
+        .arg("--json")
         .stdin(Stdio::null())
         .stderr(Stdio::inherit())
         .output()
         .into_diagnostic()
         .wrap_err_with(|| format!("cannot start {}", program.display()))?;
     if !output.status.success() {
-        return Err(miette!("{} bench --json: {}", program.display(), output.status));
+        return Err(miette!("{}: {}", program.display(), output.status));
     }
     serde_json::from_slice(&output.stdout)
         .into_diagnostic()
-        .wrap_err_with(|| format!("{} bench --json printed no list of rows", program.display()))
+        .wrap_err_with(|| format!("{} printed no list of rows", program.display()))
 }
 
 fn text(rows: &[Row]) -> String {
@@ -161,7 +154,7 @@ fn write(workspace: &Workspace, name: &str, rows: &[Row]) -> Result<PathBuf> {
     let crates = workspace.programs();
     // `langevin` is of no program: the numerics of `polycore`
     let measured: Vec<&str> = crates.iter().map(String::as_str).filter(|program| *program == of).collect();
-    let stamp = Stamp::new(workspace.root(), &sources(workspace.root(), &measured, &["src"]))?;
+    let stamp = Stamp::new(workspace.root(), &sources(workspace.root(), &measured, &["src", "benches"]))?;
     let bench = Bench { stamp, rows: rows.to_vec() };
     atomic_write(&path, |file| {
         serde_json::to_writer_pretty(&mut *file, &bench)?;

@@ -8,8 +8,10 @@ use clap::{Parser, Subcommand};
 mod bench;
 mod dist;
 mod licences;
+mod outcome;
 mod report;
 mod stamp;
+mod summary;
 mod table;
 mod test;
 mod tidy;
@@ -36,7 +38,7 @@ enum Task {
     },
     /// Run the cases and judge their expectations; the report is target/validation/report.html.
     Validate(validate::Options),
-    /// Measure: `langevin`, `peri-peers`, or a program that has a `bench --json` of its own (`peri`).
+    /// Measure: `langevin`, `peri-peers`, or a crate that has a `benches/measure.rs` (`peri`).
     Bench(bench::Options),
     /// Make the archive of a release for this system: programs, completions, man pages, licences of dependencies.
     Dist(dist::Options),

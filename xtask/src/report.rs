@@ -10,9 +10,9 @@ use miette::{IntoDiagnostic, Result, miette};
 use polycore::file::atomic_write;
 use serde::Serialize;
 
+use crate::outcome::Outcome;
+use crate::summary;
 use crate::test::{self, Records};
-use crate::validate::outcome::Outcome;
-use crate::validate::summary;
 use crate::workspace::Workspace;
 
 mod baseline;
@@ -211,7 +211,7 @@ fn page(
     tier: Tier,
 ) -> Result<Page> {
     let mut gallery = Gallery::default();
-    let found = thesis::Found { outcomes, records: &sources.records, root: workspace.root() };
+    let found = evidence::Found { outcomes, records: &sources.records, root: workspace.root() };
     let [thesis, links] = sources.map.judge(&found, &mut gallery);
     let provenance: Vec<&Provenance> =
         outcomes.iter().filter_map(|outcome| Some(&outcome.report.as_ref()?.provenance)).collect();
@@ -250,7 +250,7 @@ fn page(
         timing: timing::measured(workspace, folder, outcomes)?,
         stability: stability::trials(outcomes),
         errata: errata::judge(&sources.errata, &sources.map.erratum, &found),
-        cross: cross::checked(workspace),
+        cross: cross::checked(workspace)?,
         difference: sources.baseline.as_ref().map(|baseline| baseline.compare(outcomes)),
         cases: outcomes.iter().map(|outcome| view(workspace, outcome, &mut gallery)).collect(),
     })

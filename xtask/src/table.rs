@@ -2,6 +2,8 @@
 
 use std::io::Write as _;
 
+use harness::report::aligned;
+
 /// To standard output; a closed pipe is no reason to fail.
 pub fn print(text: &str) {
     let _ = std::io::stdout().write_all(text.as_bytes());
@@ -32,15 +34,7 @@ impl<const N: usize> Table<N> {
     /// Columns padded to their widest cell.
     pub fn text(&self) -> String {
         let heading = self.heading.map(str::to_owned);
-        let all = || std::iter::once(&heading).chain(&self.rows);
-        let widths: [usize; N] =
-            std::array::from_fn(|k| all().map(|row| row[k].chars().count()).max().unwrap_or(0));
-        let line = |row: &[String; N]| {
-            let cells = row.iter().zip(widths).map(|(cell, width)| format!("{cell:<width$}"));
-            let line = cells.collect::<Vec<_>>().join("  ");
-            line.trim_end().to_owned() + "\n"
-        };
-        all().map(line).collect()
+        aligned(&std::iter::once(&heading).chain(&self.rows).collect::<Vec<_>>())
     }
 
     /// A table of GitHub's Markdown.

@@ -8,16 +8,15 @@ use harness::case::Shard;
 use harness::scene::Source;
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
 
+use crate::outcome::Outcome;
 use crate::report;
+use crate::summary;
 use crate::table::print;
 use crate::workspace::Workspace;
 
 mod execute;
-pub mod outcome;
-pub mod summary;
 
 use execute::{Settings, run_case};
-use outcome::Outcome;
 
 /// Lines of a failed case's output that are shown.
 const TAIL: usize = 30;

@@ -2,7 +2,7 @@
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
 
@@ -71,6 +71,34 @@ impl Workspace {
             return Err(miette!("`cargo build --release --package {package}` failed"));
         }
         Ok(self.target.join("release").join(program).with_extension(std::env::consts::EXE_EXTENSION))
+    }
+
+    /// Builds the measurements of a crate, `benches/measure.rs`, and gives the path of the executable.
+    pub fn bench(&self, package: &str) -> Result<PathBuf> {
+        let known: Vec<String> = self.programs().into_iter().filter(|name| self.measures(name)).collect();
+        if !known.iter().any(|name| name == package) {
+            return Err(miette!("there is no bench `{package}` (there are: {})", known.join(", ")));
+        }
+        let cargo = std::env::var_os("CARGO").unwrap_or_else(|| OsString::from("cargo"));
+        let output = Command::new(cargo)
+            .args(["build", "--release", "--quiet", "--message-format=json-render-diagnostics"])
+            .args(["--package", package, "--bench", "measure"])
+            .current_dir(&self.root)
+            .stderr(Stdio::inherit())
+            .output()
+            .into_diagnostic()
+            .wrap_err("cannot start cargo")?;
+        let text = String::from_utf8_lossy(&output.stdout);
+        let messages = text.lines().filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok());
+        let executable =
+            messages.filter_map(|message| Some(PathBuf::from(message["executable"].as_str()?))).last();
+        executable
+            .filter(|_| output.status.success())
+            .ok_or_else(|| miette!("the bench of {package} was not built"))
+    }
+
+    fn measures(&self, name: &str) -> bool {
+        self.root.join("crates").join(name).join("benches/measure.rs").is_file()
     }
 
     /// The package of a program: its own name, or `NAME-cli` where that is the name of a library alone.

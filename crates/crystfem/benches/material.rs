@@ -1,20 +1,19 @@
-//! `cargo bench -p crystfem`: a material's response with its tangent, as `crystfem bench kinetics` measures it.
+//! `cargo bench -p crystfem`: a material's response with its tangent, as `cargo xtask bench crystfem -- kinetics` measures it.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use crystfem::material::ThermalMaterial;
 use std::hint::black_box;
 
-#[path = "../src/program/command/bench/material.rs"]
-mod material;
+mod point;
 
 fn responses(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("response");
-    for (name, start, increment) in material::STEPS {
+    for (name, start, increment) in point::STEPS {
         for latent in [None, Some(209e3)] {
-            let polymer = material::polymer(latent).unwrap_or_else(|error| panic!("{error}"));
+            let polymer = point::polymer(latent).unwrap_or_else(|error| panic!("{error}"));
             let mut old = [0.0];
             polymer.initial_state(start, &mut old);
-            let at = material::point(start, increment);
+            let at = point::point(start, increment);
             let name = format!("{name}, {} latent heat", if latent.is_some() { "with" } else { "without" });
             group.bench_function(name, |bencher| {
                 bencher.iter(|| polymer.respond(black_box(&at), black_box(&old), &mut [0.0]).is_ok());

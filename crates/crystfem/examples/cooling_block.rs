@@ -12,9 +12,8 @@ fn main() -> Result<(), crystfem::Error> {
     let material =
         Conductor::new(density, Property::Constant(conductivity), Property::Constant(specific_heat))?;
     let mesh = Grid::uniform([0.0; 3], [0.01, 0.02, 0.03], [8, 16, 24])?.mesh("block")?;
-    let (middle, corner) = (nearest(&mesh.points, [0.005, 0.01, 0.015]), nearest(&mesh.points, [0.0; 3]));
     let film = Condition::Film {
-        surface: Where::Outer { except: Default::default() },
+        surface: Where::outer(),
         coefficient: Schedule::constant(15.0),
         ambient: Schedule::constant(293.15),
     };
@@ -22,7 +21,8 @@ fn main() -> Result<(), crystfem::Error> {
     let mut simulation = Simulation::new(problem, Settings::adaptive(0.1))?;
     for minute in 0..=5 {
         simulation.run_until(60.0 * f64::from(minute))?;
-        let at = |node: u32| simulation.temperature(node).unwrap_or(f64::NAN) - 273.15;
+        let at = |place| simulation.temperature_at(place).unwrap_or(f64::NAN) - 273.15;
+        let (middle, corner) = ([0.005, 0.01, 0.015], [0.0; 3]);
         println!("{minute} min: middle {:6.2} °C, corner {:6.2} °C", at(middle), at(corner));
     }
     let ledger = &simulation.state().ledger;
@@ -32,11 +32,4 @@ fn main() -> Result<(), crystfem::Error> {
         ledger.worst
     );
     Ok(())
-}
-
-/// The node nearest to a place.
-fn nearest(points: &[[f64; 3]], place: [f64; 3]) -> u32 {
-    let distance = |x: &[f64; 3]| (0..3).map(|d| (x[d] - place[d]).powi(2)).sum::<f64>();
-    (0..points.len()).min_by(|&a, &b| distance(&points[a]).total_cmp(&distance(&points[b]))).unwrap_or(0)
-        as u32
 }

@@ -187,6 +187,13 @@ pub enum Where {
     },
 }
 
+impl Where {
+    /// The whole current outer surface.
+    pub fn outer() -> Self {
+        Self::Outer { except: Vec::new() }
+    }
+}
+
 /// A boundary condition. Several may act on one face; their heat adds up.
 #[derive(Clone, Debug)]
 pub enum Condition {

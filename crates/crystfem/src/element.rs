@@ -7,10 +7,12 @@
 mod face;
 pub mod natural;
 
-use crate::mesh::{Mesh, Shape};
+use crate::shape::Shape;
 pub use face::FaceGeometry;
 use nalgebra::Matrix3;
 use natural::Rule;
+use polycore::numerics::hexahedron;
+pub use polycore::numerics::hexahedron::CORNERS;
 
 /// Nodes of a first-order element at most, and its integration points.
 pub const MOST: usize = 8;
@@ -19,69 +21,11 @@ pub const WIDE: usize = 20;
 /// Integration points of any element at most.
 pub const WIDE_POINTS: usize = 27;
 
-/// Corners of a hexahedron in natural coordinates, in the order of Abaqus and VTK.
-pub const CORNERS: [[f64; 3]; 8] = [
-    [-1.0, -1.0, -1.0],
-    [1.0, -1.0, -1.0],
-    [1.0, 1.0, -1.0],
-    [-1.0, 1.0, -1.0],
-    [-1.0, -1.0, 1.0],
-    [1.0, -1.0, 1.0],
-    [1.0, 1.0, 1.0],
-    [-1.0, 1.0, 1.0],
-];
-
 /// 1/√3: the abscissa of the two-point Gauss rule.
 const GAUSS: f64 = 0.577_350_269_189_625_8;
 /// The four-point rule of a tetrahedron, exact to degree 2: one barycentric coordinate is NEAR, three are FAR.
 const NEAR: f64 = 0.585_410_196_624_968_5;
 const FAR: f64 = 0.138_196_601_125_010_5;
-
-/// Positions of the nodes of a first-order element; the first 4, 6 or 8 are set.
-pub fn corners(mesh: &Mesh, element: u32) -> ([[f64; 3]; MOST], usize) {
-    positions(mesh, element)
-}
-
-/// Positions of the nodes of any element.
-pub fn positions<const N: usize>(mesh: &Mesh, element: u32) -> ([[f64; 3]; N], usize) {
-    let nodes = mesh.nodes(element);
-    let mut corners = [[0.0; 3]; N];
-    for (corner, &node) in corners.iter_mut().zip(nodes) {
-        *corner = mesh.points[node as usize];
-    }
-    (corners, nodes.len())
-}
-
-/// Of any element of a mesh; `None` where a Jacobian is not positive.
-pub fn wide(mesh: &Mesh, element: u32) -> Option<Geometry<WIDE, WIDE_POINTS>> {
-    let (corners, nodes) = positions::<WIDE>(mesh, element);
-    Geometry::new(&corners[..nodes])
-}
-
-/// A positive part of an element's volume for each of its nodes, for means over nodes, m³: ∫ N dV, of second-order elements,
-/// where that is negative at corners, V ∫ N² dV over the sum of all (Hinton, Rock & Zienkiewicz 1976). `None` where a Jacobian
-/// is not positive.
-pub fn node_volumes(mesh: &Mesh, element: u32) -> Option<[f64; WIDE]> {
-    let mut volumes = [0.0; WIDE];
-    let (corners, nodes) = positions::<WIDE>(mesh, element);
-    if nodes <= MOST {
-        volumes[..MOST].copy_from_slice(&Geometry::<MOST, MOST>::new(&corners[..nodes])?.corner_volumes);
-        return Some(volumes);
-    }
-    let geometry = wide(mesh, element)?;
-    let mass = geometry.mass();
-    let sum: f64 = (0..nodes).map(|a| mass[a][a]).sum();
-    let volume: f64 = geometry.weights.iter().sum();
-    for (a, own) in volumes.iter_mut().enumerate().take(nodes) {
-        *own = volume * mass[a][a] / sum;
-    }
-    Some(volumes)
-}
-
-/// Volume, m³; 0 of an element that is not valid.
-pub fn volume(mesh: &Mesh, element: u32) -> f64 {
-    node_volumes(mesh, element).map_or(0.0, |volumes| volumes.iter().sum())
-}
 
 /// An element at its integration points.
 #[derive(Clone, Debug)]
@@ -121,14 +65,11 @@ pub fn shapes<const N: usize, const P: usize>(nodes: usize) -> [[f64; N]; P] {
         return shapes;
     }
     for point in 0..nodes {
-        for node in 0..nodes {
-            shapes[point][node] = if nodes == 8 {
-                (0..3).map(|d| 0.5 * (1.0 + GAUSS * CORNERS[point][d] * CORNERS[node][d])).product()
-            } else if point == node {
-                NEAR
-            } else {
-                FAR
-            };
+        if nodes == 8 {
+            shapes[point][..8].copy_from_slice(&hexahedron::shapes(gauss(point)));
+        } else {
+            shapes[point][..nodes].fill(FAR);
+            shapes[point][point] = NEAR;
         }
     }
     shapes
@@ -253,17 +194,14 @@ impl<const N: usize, const P: usize> Geometry<N, P> {
     }
 }
 
+fn gauss(point: usize) -> [f64; 3] {
+    CORNERS[point].map(|sign| GAUSS * sign)
+}
+
 /// ∂N/∂ξ of each node of an 8-node hexahedron or a 4-node tetrahedron at an integration point.
 fn natural_gradients(nodes: usize, point: usize, gradients: &mut [[f64; 3]]) {
     if nodes == 8 {
-        for (gradient, corner) in gradients.iter_mut().zip(&CORNERS) {
-            let factor = |d: usize| 0.5 * (1.0 + GAUSS * CORNERS[point][d] * corner[d]);
-            *gradient = [
-                0.5 * corner[0] * factor(1) * factor(2),
-                0.5 * corner[1] * factor(0) * factor(2),
-                0.5 * corner[2] * factor(0) * factor(1),
-            ];
-        }
+        gradients[..8].copy_from_slice(&hexahedron::slopes(gauss(point)));
     } else {
         gradients[..4].copy_from_slice(&[[-1.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
     }
@@ -272,7 +210,7 @@ fn natural_gradients(nodes: usize, point: usize, gradients: &mut [[f64; 3]]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::HEXAHEDRON_SIDES;
+    use crate::shape::HEXAHEDRON_SIDES;
 
     const BOX: [f64; 3] = [2.0, 3.0, 5.0];
 

@@ -5,18 +5,47 @@ use crate::error::Error;
 use crate::simulation::Simulation;
 use crate::system::{NONE, Points};
 
+/// Statistics of a field over nodes, weighted by their volumes; all not finite where a value is not.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Statistics {
+    /// Mean by volume.
+    pub mean: f64,
+    /// Smallest value.
+    pub least: f64,
+    /// Largest value.
+    pub largest: f64,
+    /// Standard deviation by volume.
+    pub deviation: f64,
+}
+
+impl Statistics {
+    /// Of the nodes that have a value and a volume; `None` without any.
+    pub fn new(values: &[Option<f64>], volumes: &[f64]) -> Option<Self> {
+        let (mut sum, mut volume) = (0.0, 0.0);
+        let (mut least, mut largest) = (f64::INFINITY, f64::NEG_INFINITY);
+        let present = || {
+            let with_volume = values.iter().zip(volumes).filter(|(_, volume)| **volume > 0.0);
+            with_volume.filter_map(|(value, volume)| Some(((*value)?, *volume)))
+        };
+        for (value, weight) in present() {
+            sum += value * weight;
+            volume += weight;
+            least = least.min(value);
+            largest = largest.max(value);
+        }
+        let mean = sum / volume;
+        // `min` and `max` pass over NaN
+        let known = |extreme: f64| if mean.is_finite() { extreme } else { mean };
+        let squares = present().map(|(value, weight)| weight * (value - mean).powi(2)).sum::<f64>();
+        let deviation = (squares / volume).sqrt();
+        (volume > 0.0).then(|| Self { mean, least: known(least), largest: known(largest), deviation })
+    }
+}
+
 impl Simulation {
     /// Names of the quantities that materials show, each once, in the order of the materials.
     pub fn field_names(&self) -> Vec<&'static str> {
-        let mut names = Vec::new();
-        for material in &self.problem.materials {
-            for name in material.field_names() {
-                if !names.contains(name) {
-                    names.push(*name);
-                }
-            }
-        }
-        names
+        self.problem.field_names()
     }
 
     /// A quantity of a material at one of its points; `None` where the material does not have it.
@@ -92,7 +121,7 @@ impl Simulation {
             };
             if nodes.len() > MOST {
                 // all points of a second-order element, by the square of the shape function there
-                let Some(geometry) = element::wide(&problem.mesh, number) else { continue };
+                let Some(geometry) = problem.mesh.geometry(number) else { continue };
                 let shapes = element::shapes::<WIDE, WIDE_POINTS>(nodes.len());
                 for (g, shapes) in shapes.iter().enumerate().take(geometry.points) {
                     for (&node, shape) in nodes.iter().zip(shapes) {
@@ -101,7 +130,7 @@ impl Simulation {
                 }
                 continue;
             }
-            let volumes = element::node_volumes(&problem.mesh, number).unwrap_or([0.0; WIDE]);
+            let volumes = problem.mesh.node_volumes(number).unwrap_or([0.0; WIDE]);
             for (g, &node) in nodes.iter().enumerate() {
                 add(node, density * volumes[g], first + g);
             }
@@ -196,7 +225,7 @@ impl Simulation {
     pub fn volumes(&self, elements: &[u32]) -> Vec<f64> {
         let mut volumes = vec![0.0; self.problem.mesh.points.len()];
         for &number in elements.iter().filter(|&&element| self.is_born(element)) {
-            let own = element::node_volumes(&self.problem.mesh, number).unwrap_or([0.0; WIDE]);
+            let own = self.problem.mesh.node_volumes(number).unwrap_or([0.0; WIDE]);
             for (&node, own) in self.problem.mesh.nodes(number).iter().zip(own) {
                 volumes[node as usize] += own;
             }

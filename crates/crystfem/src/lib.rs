@@ -30,34 +30,34 @@
 //! The modules below are the parts of [`printed`]. Use them directly for meshes from files, tool paths, other conditions
 //! and materials of your own.
 
+mod births;
 pub mod boundary;
+pub mod coupling;
 mod element;
-mod elementary;
 pub mod error;
 pub mod exact;
 mod fields;
+mod file;
 pub mod fit;
 pub mod healing;
 pub mod history;
 pub mod kinetics;
-mod layers;
 pub mod ledger;
 pub mod material;
 pub mod mechanics;
 pub mod melting;
 pub mod mesh;
 pub mod point;
+pub mod print_plan;
 pub mod printed;
 pub mod problem;
+mod shape;
+mod simd_math;
 pub mod simulation;
 mod solver;
 mod system;
 pub mod table;
 pub mod time;
-
-// `cargo bench` compiles a file of `program`, in which this crate has its name
-#[cfg(feature = "case")]
-extern crate self as crystfem;
 
 #[cfg(feature = "case")]
 pub mod program;

@@ -1,7 +1,7 @@
 //! Melting: the degree of melting X_m(T) of Richards' curve, and the survival of crystals on heating.
 
-use crate::elementary::{exp, expm1_near, ln, ln_1p};
 use crate::error::Error;
+use crate::simd_math::{exp, expm1_near, ln, ln_1p};
 
 /// Richards' curve, the distribution of melting temperatures. Eq. (4.8) integrates in closed form to
 /// X_m = (1 + (d−1) e^{−k_m(T−T_p)})^{1/(1−d)}.

@@ -7,7 +7,10 @@ use crate::material::{Point, ThermalMaterial};
 use nalgebra::Vector3;
 use root::root;
 
+mod material_point;
 mod root;
+
+pub use material_point::MaterialPoint;
 
 /// What drives the temperature.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,24 +1,33 @@
-//! Printed parts in a few lines: a mesh with layers, a material, what surrounds it.
+//! Printed parts in a few lines: a mesh with layers or a tool path, a material, what surrounds it.
 
 use crate::boundary::{Condition, Field, Schedule, Where};
 use crate::error::Error;
-use crate::material::ThermalMaterial;
+use crate::material::{ThermalMaterial, fill_elements};
 use crate::mesh::layers::Layers;
+use crate::mesh::path::{Cells, ToolPath};
 use crate::mesh::{Bar, Face, Mesh};
-use crate::problem::{Birth, Problem};
+use crate::print_plan::PrintPlan;
+use crate::problem::Problem;
 use crate::simulation::{Settings, Simulation};
 use std::sync::Arc;
 
-/// A part that is printed layer by layer.
+/// Order of a print.
+enum Order {
+    Layers(Layers),
+    /// A path, the time of each element on it, s, filled parts, and which of them each element has.
+    Path(ToolPath, Vec<f64>, (Vec<f64>, Vec<usize>)),
+}
+
+/// A part that is printed layer by layer or along a tool path.
 ///
-/// Unless told otherwise layers come every 20 s at 220 °C, and no heat crosses the surface.
+/// By default layers come every 20 s at 220 °C, a path has the temperatures of its nozzle, and no heat crosses the surface.
 pub struct PrintedPart {
     mesh: Mesh,
-    layers: Layers,
+    order: Order,
     material: Arc<dyn ThermalMaterial>,
     substrate: Option<(Arc<dyn ThermalMaterial>, f64)>,
     interval: f64,
-    temperature: f64,
+    temperature: Option<f64>,
     held: Vec<(String, f64)>,
     /// Conditions on the outer surface but the held ones, by their place.
     outer: Vec<Box<dyn Fn(Where) -> Condition>>,
@@ -27,13 +36,31 @@ pub struct PrintedPart {
 impl PrintedPart {
     /// Layers of a mesh, of one material.
     pub fn new(mesh: Mesh, layers: Layers, material: impl ThermalMaterial + 'static) -> Self {
+        Self::ordered(mesh, Order::Layers(layers), material)
+    }
+
+    /// Cells that the beads of a path fill, printed in the order of its moves.
+    ///
+    /// # Errors
+    /// Those of [`ToolPath::deposit`].
+    pub fn along(
+        path: ToolPath,
+        cells: &Cells,
+        material: impl ThermalMaterial + 'static,
+    ) -> Result<Self, Error> {
+        let deposit = path.deposit(cells)?;
+        let fill = deposit.voxels.bins();
+        Ok(Self::ordered(deposit.voxels.mesh, Order::Path(path, deposit.times, fill), material))
+    }
+
+    fn ordered(mesh: Mesh, order: Order, material: impl ThermalMaterial + 'static) -> Self {
         Self {
             mesh,
-            layers,
+            order,
             material: Arc::new(material),
             substrate: None,
             interval: 20.0,
-            temperature: 493.15,
+            temperature: None,
             held: Vec::new(),
             outer: Vec::new(),
         }
@@ -61,9 +88,9 @@ impl PrintedPart {
         self
     }
 
-    /// Temperature of a layer when it is laid down, K.
+    /// Temperature of new material, K.
     pub fn deposited_at(mut self, kelvin: f64) -> Self {
-        self.temperature = kelvin;
+        self.temperature = Some(kelvin);
         self
     }
 
@@ -99,15 +126,28 @@ impl PrintedPart {
     /// [`Error::Mesh`] for a surface that the mesh lacks, and for elements in no layer where there is no substrate;
     /// [`Error::Parameter`] for a time between layers that is not positive. [`Simulation::new`] checks the rest.
     pub fn problem(self) -> Result<Problem, Error> {
-        let Self { mesh, layers, material, substrate, interval, temperature, held, outer } = self;
+        let Self { mesh, order, material, substrate, interval, temperature, held, outer } = self;
         if !(interval > 0.0 && interval.is_finite()) {
             let allowed = "above 0 s, finite".into();
             return Err(Error::Parameter { name: "time between layers", found: interval, allowed });
         }
+        let (plan, fill) = match order {
+            Order::Layers(layers) => {
+                let kelvin = temperature.unwrap_or(493.15);
+                (PrintPlan::in_layers(layers.elements, 0.0, interval, |_| kelvin), None)
+            }
+            Order::Path(path, times, fill) => {
+                let given = temperature.map(Schedule::constant);
+                (PrintPlan::along(&path, &times, 0.0, None, given.as_ref())?, Some(fill))
+            }
+        };
+        let births = plan.births;
         let mut material_of = vec![1; mesh.element_count()];
-        layers.elements.iter().flatten().for_each(|&element| material_of[element as usize] = 0);
+        let printed = births.iter().flat_map(|birth| &birth.elements);
+        printed.for_each(|&element| material_of[element as usize] = 0);
         let beside = material_of.iter().filter(|&&material| material == 1).count();
-        let (mut materials, mut start) = (vec![material], temperature);
+        let mut start = births.first().map_or(f64::NAN, |birth| birth.temperature);
+        let mut materials = vec![material];
         match substrate {
             Some((material, temperature)) => {
                 materials.push(material);
@@ -130,12 +170,10 @@ impl PrintedPart {
             conditions.push(Condition::Temperature { nodes, value: Field::constant(kelvin) });
         }
         conditions.extend(outer.iter().map(|condition| condition(Where::Outer { except: except.clone() })));
-        let births = (0..).zip(layers.elements).map(|(layer, elements)| {
-            let time = f64::from(layer) * interval;
-            Birth { time, elements, temperature }
-        });
-        let births = births.collect();
         let whole = Problem::new(mesh, materials[0].clone(), start);
+        if let Some((parts, part_of)) = &fill {
+            fill_elements(&mut materials, &mut material_of, parts, part_of)?;
+        }
         Ok(Problem { materials, material_of, conditions, births, ..whole })
     }
 

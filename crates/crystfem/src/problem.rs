@@ -1,10 +1,10 @@
 //! What is solved: a mesh with materials, what acts on it, and when its elements appear.
 
 use crate::boundary::{Condition, Field, Source, Where};
-use crate::element;
 use crate::error::Error;
 use crate::material::ThermalMaterial;
 use crate::mesh::{Face, Mesh};
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 /// How heat capacity is represented.
@@ -55,6 +55,17 @@ pub struct Problem {
 }
 
 impl Problem {
+    /// Names of the quantities that materials show, each once, in the order of the materials.
+    pub fn field_names(&self) -> Vec<&'static str> {
+        let mut names = Vec::new();
+        for name in self.materials.iter().flat_map(|material| material.field_names()) {
+            if !names.contains(name) {
+                names.push(*name);
+            }
+        }
+        names
+    }
+
     /// One material everywhere, one initial temperature, nothing acting on it.
     pub fn new(mesh: Mesh, material: Arc<dyn ThermalMaterial>, temperature: f64) -> Self {
         let elements = mesh.element_count();
@@ -119,7 +130,7 @@ impl Problem {
             if let Some(node) = self.mesh.nodes(element).iter().find(|&&n| n as usize >= points) {
                 return mesh_error(format!("element {element}: found node {node}; allowed: below {points}"));
             }
-            if element::node_volumes(&self.mesh, element).is_none() {
+            if self.mesh.node_volumes(element).is_none() {
                 let first =
                     self.mesh.nodes(element).first().map_or([0.0; 3], |&n| self.mesh.points[n as usize]);
                 return mesh_error(format!(
@@ -240,4 +251,24 @@ impl Problem {
         }
         Ok(())
     }
+}
+
+/// Temperature at the nodes, K, from that of each element: of the last element at a node that is not among those `later`
+/// printed.
+pub fn initial_temperatures(mesh: &Mesh, temperature_of: &[f64], later: &HashSet<u32>) -> Field {
+    let first = temperature_of.first().copied().unwrap_or(0.0);
+    if temperature_of.iter().all(|&temperature| temperature == first) {
+        return Field::constant(first);
+    }
+    // by place, as the problem asks; places of nodes are exact
+    let mut at = HashMap::new();
+    for (element, &temperature) in temperature_of.iter().enumerate() {
+        if later.contains(&(element as u32)) {
+            continue;
+        }
+        for &node in mesh.nodes(element as u32) {
+            at.insert(mesh.points[node as usize].map(f64::to_bits), temperature);
+        }
+    }
+    Field::function(move |place, _| at.get(&place.map(f64::to_bits)).copied().unwrap_or(first))
 }

@@ -1,6 +1,7 @@
 //! The program `crystfem`: scenes in TOML, their runs, the command line. The only room of this crate that knows of them.
 
 pub mod command;
+pub mod observe;
 pub mod quantities;
 pub mod run;
 pub mod scene;

@@ -4,13 +4,15 @@
 mod step;
 
 use crate::error::Error;
+pub use crate::fields::Statistics;
 use crate::ledger::{Ledger, Record};
 use crate::problem::Problem;
 use crate::solver::Task;
 pub use crate::solver::{Choice, LinearSolver, Method};
 use crate::system::{Behaviour, Exchange, NONE, System};
 pub use crate::system::{Memory, Points};
-use crate::time::{Scheme, Stepper, Steps, Work};
+use crate::time::{Scheme, Start, Stepper, Steps, Work};
+use polycore::numerics::bounds;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -76,7 +78,7 @@ pub struct State {
     pub time: f64,
     /// Temperature of each equation, K.
     pub temperature: Vec<f64>,
-    /// Its rate of change over the last step, K/s; empty after a jump.
+    /// Rate of change over the last step, K/s; empty after a jump.
     pub slope: Vec<f64>,
     /// Q of each equation, W; empty if not known.
     pub rate: Vec<f64>,
@@ -102,6 +104,14 @@ pub struct State {
     pub work: Work,
 }
 
+impl State {
+    /// What a step begins with.
+    pub(crate) fn start(&self) -> Start<'_> {
+        let Self { time, temperature, slope, rate, exchange, memory, .. } = self;
+        Start { time: *time, temperature, slope, rate, exchange, memory }
+    }
+}
+
 /// A problem being solved.
 pub struct Simulation {
     pub(crate) problem: Arc<Problem>,
@@ -114,15 +124,18 @@ pub struct Simulation {
 }
 
 impl Simulation {
+    /// Counts material points and distinct rows of the matrix, and bytes of all stored rows.
+    pub fn storage(&self) -> [usize; 3] {
+        let rows = &self.system.rows;
+        [self.system.nodal.material.len(), rows.stored()[0], rows.bytes()]
+    }
+
     /// At time 0, with what exists then. A problem that others use too is shared by an [`Arc`].
     ///
     /// # Errors
     /// Those of [`Problem::check`] and of the materials.
     pub fn new(problem: impl Into<Arc<Problem>>, settings: Settings) -> Result<Self, Error> {
-        Self::begin(problem.into(), settings)
-    }
-
-    fn begin(problem: Arc<Problem>, settings: Settings) -> Result<Self, Error> {
+        let problem = problem.into();
         let (behaviours, breaks) = Self::prepare(&problem, &settings)?;
         let mut state = State { born: vec![0; problem.material_of.len()], jump: true, ..State::default() };
         let later = problem.births.iter().flat_map(|birth| &birth.elements);
@@ -157,10 +170,7 @@ impl Simulation {
     /// # Errors
     /// As [`Self::new`]; [`Error::Mesh`] where the state does not belong to the problem.
     pub fn resume(problem: impl Into<Arc<Problem>>, settings: Settings, state: State) -> Result<Self, Error> {
-        Self::go_on(problem.into(), settings, state)
-    }
-
-    fn go_on(problem: Arc<Problem>, settings: Settings, state: State) -> Result<Self, Error> {
+        let problem = problem.into();
         let (behaviours, breaks) = Self::prepare(&problem, &settings)?;
         if state.born.len() != problem.material_of.len() {
             return Err(Error::Mesh(format!(
@@ -205,12 +215,12 @@ impl Simulation {
         Ok((behaviours, problem.breaks()))
     }
 
-    /// What is solved.
+    /// Returns the problem.
     pub fn problem(&self) -> &Problem {
         &self.problem
     }
 
-    /// Where it stands: serialise it to continue later with the same bits.
+    /// Returns the state; serialise it to continue later with the same bits.
     pub fn state(&self) -> &State {
         &self.state
     }
@@ -220,12 +230,12 @@ impl Simulation {
         self.state.time
     }
 
-    /// Whether a node of the mesh exists.
+    /// Returns whether a node of the mesh exists.
     pub fn exists(&self, node: u32) -> bool {
         self.system.equation.get(node as usize).is_some_and(|&equation| equation != NONE)
     }
 
-    /// Whether an element exists.
+    /// Returns whether an element exists.
     pub fn is_born(&self, element: u32) -> bool {
         self.state.born.get(element as usize).is_some_and(|&birth| birth != NONE)
     }
@@ -302,6 +312,23 @@ impl Simulation {
         self.advance(until, &mut |_, _| ControlFlow::Continue(())).map(|_| ())
     }
 
+    /// [`Self::advance`] with a look at each accepted step, which ends at its first error.
+    ///
+    /// # Errors
+    /// As [`Self::advance`], and those of `after_step`.
+    pub fn observe(
+        &mut self,
+        until: f64,
+        mut after_step: impl FnMut(&Self) -> Result<(), Error> + Send,
+    ) -> Result<(), Error> {
+        let mut result = Ok(());
+        let _ = self.advance(until, &mut |simulation, _| {
+            result = after_step(simulation);
+            if result.is_err() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        })?;
+        result
+    }
+
     /// How linear systems would be solved from now to a time, and why.
     pub fn choose(&self, until: f64) -> Choice {
         self.task(until).choose()
@@ -323,13 +350,8 @@ impl Simulation {
         // A_ii of backward Euler over the capacity
         let capacity = |k: usize| self.system.capacity[k];
         let size = self.system.size();
-        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for &node in self.system.nodes() {
-            let point = self.problem.mesh.points[node as usize];
-            for d in 0..3 {
-                (low[d], high[d]) = (low[d].min(point[d]), high[d].max(point[d]));
-            }
-        }
+        let [low, high] =
+            bounds(self.system.nodes().iter().map(|&node| self.problem.mesh.points[node as usize]));
         let extent = [0, 1, 2].map(|d| (high[d] - low[d]).max(0.0));
         let longest = extent.into_iter().fold(0.0, f64::max);
         let spacing = (extent.iter().product::<f64>() / size as f64).cbrt().max(1e-6 * longest);

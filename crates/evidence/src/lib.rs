@@ -5,6 +5,7 @@
 //! number found is left there, met or not. [`skipped`] leaves there what a test could not find on this machine.
 
 pub mod hosts;
+pub mod measurement;
 
 use std::fs;
 use std::hash::{DefaultHasher, Hash, Hasher};

@@ -2,6 +2,9 @@
 //! provides, sees every accepted step, and writes its results at the end; the checkpoint keeps what it has seen.
 
 use crate::report::Named;
+use polycore::Error;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 use std::path::Path;
 
 /// Watches a run whose state is an `S`; `E` is the error of the program.
@@ -22,6 +25,11 @@ pub trait Observer<S: ?Sized, E> {
 
     /// Sentences on what is allowed and most likely not meant, of the final state.
     fn warnings(&self, _state: &S) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// Counts of its work.
+    fn work(&self, _state: &S) -> Vec<(&'static str, u64)> {
         Vec::new()
     }
 
@@ -46,11 +54,19 @@ pub trait Observer<S: ?Sized, E> {
         Ok(())
     }
 
-    /// Writes its tables and pictures.
+    /// Writes its tables.
     ///
     /// # Errors
     /// Files that cannot be written.
     fn write(&self, _state: &S, _to: &Outputs) -> Result<(), E> {
+        Ok(())
+    }
+
+    /// Writes its pictures, where the scene asks for them.
+    ///
+    /// # Errors
+    /// Files that cannot be written.
+    fn draw(&self, _state: &S, _to: &Outputs) -> Result<(), E> {
         Ok(())
     }
 
@@ -75,6 +91,24 @@ pub struct Curve {
     pub name: String,
     /// Columns: name, unit, values.
     pub columns: Vec<(&'static str, &'static str, Vec<f64>)>,
+}
+
+/// Bytes of what an observer has seen, for [`Observer::save`].
+pub fn encode<T: Serialize>(seen: &T) -> Vec<u8> {
+    // lists and numbers in memory: nothing that postcard refuses
+    postcard::to_stdvec(seen).unwrap_or_default()
+}
+
+/// What [`encode`] made bytes of.
+///
+/// # Errors
+/// [`Error::Format`] for bytes of another version.
+pub fn decode<T: DeserializeOwned>(saved: &[u8]) -> Result<T, Error> {
+    postcard::from_bytes(saved).map_err(|error| Error::Format {
+        path: crate::checkpoint::FILE_NAME.into(),
+        format: "checkpoint",
+        reason: error.to_string(),
+    })
 }
 
 /// Where the files of observers go.
@@ -176,7 +210,7 @@ impl<'a, S: ?Sized> Fields<'a, S> {
 }
 
 /// The observers of a run, in the order of their output.
-pub struct Observers<'a, S: ?Sized, E>(pub Vec<Box<dyn Observer<S, E> + 'a>>);
+pub struct Observers<'a, S: ?Sized, E>(pub Vec<Box<dyn Observer<S, E> + Send + 'a>>);
 
 impl<S: ?Sized, E> Observers<'_, S, E> {
     /// Names of all scalars.
@@ -220,12 +254,25 @@ impl<S: ?Sized, E> Observers<'_, S, E> {
         self.0.iter_mut().try_for_each(|observer| observer.end(state))
     }
 
-    /// Writes all tables and pictures.
+    /// Writes all tables.
     ///
     /// # Errors
     /// Files that cannot be written.
     pub fn write(&self, state: &S, to: &Outputs) -> Result<(), E> {
         self.0.iter().try_for_each(|observer| observer.write(state, to))
+    }
+
+    /// Writes all pictures.
+    ///
+    /// # Errors
+    /// Files that cannot be written.
+    pub fn draw(&self, state: &S, to: &Outputs) -> Result<(), E> {
+        self.0.iter().try_for_each(|observer| observer.draw(state, to))
+    }
+
+    /// Counts of the work of all.
+    pub fn work(&self, state: &S) -> Vec<(&'static str, u64)> {
+        self.0.iter().flat_map(|observer| observer.work(state)).collect()
     }
 
     /// What all have seen, for the checkpoint.

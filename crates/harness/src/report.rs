@@ -231,7 +231,7 @@ impl Report {
                 }
             });
         }
-        align(&mut text, &rows);
+        text += &aligned(&rows);
         if rows.len() < self.values.len() {
             let _ = writeln!(text, "{} more values in {FILE_NAME}", self.values.len() - rows.len());
         }
@@ -254,7 +254,7 @@ impl Report {
     /// The judged expectations and what is not finite, as text.
     pub fn verdict(&self) -> String {
         let mut text = String::new();
-        align(&mut text, &self.expect.iter().map(Judgement::row).collect::<Vec<_>>());
+        text += &aligned(&self.expect.iter().map(Judgement::row).collect::<Vec<_>>());
         for name in &self.non_finite {
             let _ = writeln!(text, "FAIL  {name} is not finite");
         }
@@ -337,17 +337,20 @@ impl Phases {
     }
 }
 
-fn align<const N: usize>(text: &mut String, rows: &[[String; N]]) {
-    let mut widths = [0; N];
-    for row in rows {
+/// Aligns cells in columns that are two blanks apart; rows of another length than the first do not widen them.
+pub fn aligned<R: AsRef<[String]>>(rows: &[R]) -> String {
+    let columns = rows.first().map_or(0, |row| row.as_ref().len());
+    let mut widths = vec![0; columns];
+    for row in rows.iter().map(AsRef::as_ref).filter(|row| row.len() == columns) {
         for (width, cell) in widths.iter_mut().zip(row) {
             *width = (*width).max(cell.chars().count());
         }
     }
-    for row in rows {
-        let cells = row.iter().zip(widths).map(|(cell, width)| format!("{cell:<width$}"));
-        let _ = writeln!(text, "{}", cells.collect::<Vec<_>>().join("  ").trim_end());
-    }
+    let line = |row: &R| {
+        let cells = row.as_ref().iter().zip(&widths).map(|(cell, &width)| format!("{cell:<width$}"));
+        cells.collect::<Vec<_>>().join("  ").trim_end().to_owned() + "\n"
+    };
+    rows.iter().map(line).collect()
 }
 
 #[cfg(test)]

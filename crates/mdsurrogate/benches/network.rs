@@ -1,11 +1,10 @@
-//! `cargo bench -p mdsurrogate`: a stress, a stress with its tangent and lists of stresses, as `mdsurrogate bench` measures
+//! `cargo bench -p mdsurrogate`: a stress, a stress with its tangent and lists of stresses, as `cargo xtask bench mdsurrogate` measures
 //! them, for a list of 512 points.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use mdsurrogate::surrogate::{Prediction, Workspace};
 use std::hint::black_box;
 
-#[path = "../src/program/command/bench_points.rs"]
 mod points;
 
 fn predictions(criterion: &mut Criterion) {

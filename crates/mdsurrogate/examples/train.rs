@@ -4,7 +4,7 @@ use mdsurrogate::dataset::Row;
 use mdsurrogate::export::c_source;
 use mdsurrogate::fitted;
 use mdsurrogate::random::SplitMix64;
-use mdsurrogate::train::{Settings, Training, ensemble};
+use mdsurrogate::train::{Settings, fit};
 use polycore::constitutive::hyperelastic::{Compressible, Hyperelastic, NeoHookean, Volumetric};
 use polycore::constitutive::network::{Activation::Softplus, Architecture};
 use polycore::constitutive::surrogate::{Kind, Symmetry};
@@ -27,15 +27,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let architecture = Architecture::new(kind.inputs(), &[(16, Softplus), (16, Softplus)], 1);
     let header = fitted::header(kind, architecture, 1, &rows, true)?;
     let settings = Settings { epochs: 60, learning_rate: 5e-3, ..Settings::default() };
-    let mut training = Training::new(&header, &rows, &[], settings)?;
-    while training.ending().is_none() {
-        training.epoch()?;
-    }
-    let model = ensemble(header, &[training.best().to_vec()])?;
+    let (model, states) = fit(header, &rows, &[], settings)?;
     println!(
         "{} parameters, loss {:.2e} MPa²",
         model.header().architecture.parameters(),
-        training.state().best_loss()
+        states[0].best_loss()
     );
 
     let found = Deviations::of(&model, &deformations()[..3])?;

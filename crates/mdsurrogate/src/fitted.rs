@@ -5,6 +5,7 @@ use crate::dataset::Row;
 use crate::network::{Architecture, LANES};
 use crate::surrogate::{Features, Header, Kind, Support, Surrogate, UNSEEN};
 use nalgebra::Vector3;
+use polycore::numerics::range;
 use polycore::tensor::{Tensor, Voigt, voigt};
 
 /// Representatives of the training strains in a law ([`Support`]).
@@ -64,8 +65,7 @@ pub fn header(
         of_stress[a] = moments("S", &stress)?;
         [_, of_strain[a]] = moments("C", &strain)?;
         largest = largest.max(of_stress[a][1] * of_strain[a]);
-        header.training_box[a] =
-            known.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], c| [low.min(c), high.max(c)]);
+        header.training_box[a] = range(known);
     }
     if header.kind != Kind::Ann {
         for (k, deviation) in header.input_deviation.iter_mut().enumerate() {

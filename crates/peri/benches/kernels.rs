@@ -1,19 +1,17 @@
-//! `cargo bench -p peri`: force densities of all bonds, as `peri bench` and `cargo xtask bench peri` measure them.
+//! `cargo bench -p peri`: force densities of all bonds, as `cargo xtask bench peri` measures them.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use peri::bonds::{Bonds, CloudBonds, VolumeCorrection, force};
+use peri::bonds::{BodyGeometry, BondDamage, CloudBonds, VolumeCorrection, force};
 use peri::field::Field;
 use peri::potential::{KernelFit, Law};
-use peri::program::run::Failure;
 use peri::stress::{BallVolume, Loaded, Measure, Missing, piola_in_cloud};
 
-#[path = "../src/program/command/bench/kernel.rs"]
 mod kernel;
 
 /// Particles: what the caches hold.
 const SIZE: f64 = 1e4;
 
-fn dimension<const D: usize>(criterion: &mut Criterion) -> Result<(), Failure> {
+fn dimension<const D: usize>(criterion: &mut Criterion) -> Result<(), peri::Error> {
     for (law, range) in
         [(Law::ChainOffset, [0.95, 1.05]), (Law::ChainOffset, [0.5, 3.0]), (Law::Linear, [0.95, 1.05])]
     {

@@ -5,7 +5,7 @@
 //! cargo run --release --package peri --example linear_solid
 //! ```
 
-use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
+use peri::bonds::{BodyGeometry, LatticeBonds, VolumeCorrection};
 use peri::calibrate::modulus_in;
 use peri::geometry::{Operation, Shape, lattice};
 use peri::material::{Bond, Family, Material, Property};
@@ -91,7 +91,7 @@ impl<const D: usize> Material<D> for LinearSolid {
     }
 
     /// Of Young's modulus E ≈ 3μ.
-    fn micromodulus(&self, bonds: &dyn Bonds<D>) -> f64 {
+    fn micromodulus(&self, bonds: &dyn BodyGeometry<D>) -> f64 {
         modulus_in(bonds, 3.0 * self.shear.least())
     }
 }

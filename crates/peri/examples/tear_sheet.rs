@@ -26,6 +26,6 @@ fn main() -> Result<(), peri::Error> {
     }
     let peak = simulation.history().iter().map(|record| record.load).fold(0.0, f64::max);
     println!("peak {peak:.2} N, {} pieces", simulation.fragments());
-    assert!(peak > 0.0 && simulation.state.broken > 0);
+    assert!(peak > 0.0 && simulation.state.fracture.broken > 0);
     Ok(())
 }

@@ -3,7 +3,7 @@
 //! The dual force f = 2t enters the equation of motion (2.6). With t ≈ 3kθ(l − 1), (2.76) and (2.80) equal the standard
 //! constants of the prototype microelastic material; Poisson's ratio is 1/4 (3D, plane strain) or 1/3 (plane stress).
 
-use crate::bonds::{Bonds, LatticeBonds, Stencil, VolumeCorrection};
+use crate::bonds::{BodyGeometry, LatticeBonds, Stencil, VolumeCorrection};
 use serde::Deserialize;
 use std::f64::consts::PI;
 
@@ -59,7 +59,7 @@ pub fn modulus(space: Space, youngs_modulus: f64, horizon: f64, thickness: f64) 
 }
 
 /// kθ of bonds in a solid or, in two dimensions, in a sheet of the thickness that its particles have.
-pub fn modulus_in<const D: usize>(bonds: &dyn Bonds<D>, youngs_modulus: f64) -> f64 {
+pub fn modulus_in<const D: usize>(bonds: &dyn BodyGeometry<D>, youngs_modulus: f64) -> f64 {
     let volume = bonds.particles().first().map_or(0.0, |&site| bonds.volume(site as usize));
     let thickness = volume / bonds.spacing().powi(D as i32);
     let space = if D == 2 { Space::PlaneStress } else { Space::Solid };

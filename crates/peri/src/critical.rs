@@ -6,12 +6,13 @@ mod crossing;
 pub use area::CrackArea;
 pub use crossing::{Convention, Crossing};
 
-use crate::bonds::Bonds;
+use crate::bonds::BodyGeometry;
 use crate::calibrate::Space;
 use crate::error::Error;
 use crate::material::{PointLaw, energy_at_strength};
 use crate::potential::{BondPotential, NetworkStretch, softened_energy};
 use crate::solver::{Bilinear, Criterion};
+use polycore::numerics::{bisect, bisected};
 use polycore::units::{EnergyPerArea, Stress};
 use serde::Deserialize;
 use std::f64::consts::PI;
@@ -101,13 +102,13 @@ pub struct Context<'a> {
 /// Energy density Y_c, J/m³, beyond which bonds of a solid break that has the fracture energy G, J/m²: G/(c Σ ŵ|ξ₁|), with the sum over
 /// the largest family of the body. c = 1.13 + 0.98/m, m the horizon over the spacing, makes the crack of a pure-shear strip run at G
 /// (cases/ch5/rubber-tearing): bonds ahead of a tip release less than the mean of those that a crack cuts.
-pub fn energy_limit<const D: usize>(bonds: &dyn Bonds<D>, fracture_energy: f64) -> f64 {
+pub fn energy_limit<const D: usize>(bonds: &dyn BodyGeometry<D>, fracture_energy: f64) -> f64 {
     let (reach, calibration) = share_of_crack(bonds);
     fracture_energy / (calibration * reach)
 }
 
 /// Σ ŵ|ξ₁| of the largest family, m, and c of bonds that break at once.
-fn share_of_crack<const D: usize>(bonds: &dyn Bonds<D>) -> (f64, f64) {
+fn share_of_crack<const D: usize>(bonds: &dyn BodyGeometry<D>) -> (f64, f64) {
     // the axis along which the family reaches farthest, in bodies thinner than it
     let mut most = [0.0_f64; 2];
     for &site in bonds.particles() {
@@ -134,7 +135,7 @@ const CALIBRATION: [f64; 4] = [1.0, 0.85, 0.73, 0.62];
 /// # Errors
 /// That limit.
 pub fn bilinear<const D: usize>(
-    bonds: &dyn Bonds<D>,
+    bonds: &dyn BodyGeometry<D>,
     fracture_energy: f64,
     onset: f64,
 ) -> Result<Bilinear, f64> {
@@ -149,11 +150,8 @@ pub fn bilinear<const D: usize>(
     if wanted.is_nan() || wanted < brittle {
         return Err(fracture_energy / (brittle * reach));
     }
-    let (mut low, mut high) = (1.0, wanted / calibration(8.0));
-    for _ in 0..100 {
-        let middle = 0.5 * (low + high);
-        if middle * calibration(middle) < wanted { low = middle } else { high = middle }
-    }
+    let most = wanted / calibration(8.0);
+    let [_, high] = bisect(1.0, most, 100, |ductility| ductility * calibration(ductility) < wanted);
     Ok(Bilinear { onset, limit: high * onset })
 }
 
@@ -178,7 +176,7 @@ impl Critical {
     pub fn of_solid<const D: usize>(
         &self,
         law: &dyn PointLaw<D>,
-        bonds: &dyn Bonds<D>,
+        bonds: &dyn BodyGeometry<D>,
     ) -> Result<Criterion, Error> {
         let energy = self.fracture_energy.map_or(f64::NAN, |energy| energy.si());
         match (self.stretch, self.strength.map(|strength| strength.si())) {
@@ -309,11 +307,7 @@ fn stretch_of_energy(context: &Context, convention: Convention, energy: f64) -> 
             return fault("smaller: no bond stretch stores it");
         }
     }
-    for _ in 0..200 {
-        let middle = 0.5 * (low + high);
-        if of(middle) < energy { low = middle } else { high = middle }
-    }
-    Ok(0.5 * (low + high))
+    Ok(bisected(low, high, 200, |stretch| of(stretch) < energy))
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ pub use plate::Plate;
 use crate::bonds::Stencil;
 use crate::potential::BondPotential;
 use crate::quadrature::mean;
+use polycore::numerics::bisected;
 
 /// Kirsch's stresses [σ_xx, σ_yy, σ_xy] at (x, y) around a hole of `radius` at the origin of an infinite plate under
 /// remote tension `remote` along x, Eqs (2.81)–(2.83); continued as printed inside the hole.
@@ -114,12 +115,7 @@ fn uniaxial(stretch: f64, stress: impl Fn(f64) -> [f64; 2]) -> (f64, f64) {
         return (1.0, stress(1.0)[0]);
     }
     let Some(k) = (1..=96).find(|k| sign(at(*k)) != start) else { return (f64::NAN, f64::NAN) };
-    let (mut near, mut far) = (at(k - 1), at(k));
-    for _ in 0..60 {
-        let middle = 0.5 * (near + far);
-        if sign(middle) == start { near = middle } else { far = middle }
-    }
-    let lateral = 0.5 * (near + far);
+    let lateral = bisected(at(k - 1), at(k), 60, |lateral| sign(lateral) == start);
     (lateral, stress(lateral)[0])
 }
 

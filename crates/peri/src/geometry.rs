@@ -214,9 +214,7 @@ pub fn recognise<const D: usize>(points: &[[f64; D]], volumes: &[f64], thickness
         return None;
     }
     let spacing = (volume / thickness).powf(1.0 / D as f64);
-    let low: [f64; D] = std::array::from_fn(|d| points.iter().map(|p| p[d]).fold(f64::INFINITY, f64::min));
-    let high: [f64; D] =
-        std::array::from_fn(|d| points.iter().map(|p| p[d]).fold(f64::NEG_INFINITY, f64::max));
+    let [low, high] = polycore::numerics::bounds(points.iter().copied());
     let extent: [f64; D] = std::array::from_fn(|d| ((high[d] - low[d]) / spacing).round() + 1.0);
     // a sparse box would waste more than a neighbour list; of a spacing of 0 the extent is not a number
     let sparse = extent.iter().product::<f64>() > 8.0 * points.len() as f64;

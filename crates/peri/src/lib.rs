@@ -51,10 +51,6 @@ pub mod solver;
 pub mod stress;
 pub mod surface;
 
-// `cargo bench` compiles a file of `program`, in which this crate has its name
-#[cfg(feature = "case")]
-extern crate self as peri;
-
 #[cfg(feature = "case")]
 pub mod program;
 

@@ -6,7 +6,7 @@ mod rubber;
 pub use body::Body;
 pub use rubber::Rubber;
 
-use crate::bonds::{Bonds, LatticeBonds, Property, covered_stretches, fragments};
+use crate::bonds::{BodyGeometry, LatticeBonds, Property, covered_stretches, fragments};
 use crate::contact::{Contact, Plane};
 use crate::error::Error;
 use crate::material::{BondMaterial, Material, NonlocalSolid, PointLaw};

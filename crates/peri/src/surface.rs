@@ -1,6 +1,6 @@
 //! Surface of a body as face points, about one for each particle on it: where rigid planes touch.
 
-use crate::bonds::{Bonds, LatticeBonds};
+use crate::bonds::{BodyGeometry, LatticeBonds};
 use crate::geometry::{Operation, Shape, bounds, cell_counts, inside, length};
 use std::collections::HashSet;
 use std::f64::consts::{PI, TAU};

@@ -6,7 +6,10 @@ mod bodies;
 
 use bodies::{Body, MODULUS, Random, fit, hold, laws, norm};
 use peri::Error;
-use peri::bonds::{Bonds, Lattice, LatticeBonds, VolumeCorrection, force, overstretched, stretch_range};
+use peri::bonds::{
+    BodyGeometry, BondDamage, BondForces, Bonds, Lattice, LatticeBonds, VolumeCorrection, force,
+    overstretched, stretch_range,
+};
 use peri::field::Field;
 use peri::gpu::{Device, DeviceBody, Precision, Start};
 use peri::material::BondMaterial;
@@ -66,7 +69,7 @@ fn compare_forces<const D: usize>(device: &Device, cells: [usize; D]) {
     let mut bonds = damaged(cells);
     let u = random(&bonds, 0.05);
     let all = bonds.directed_bonds();
-    bonds.sever(&overstretched(&bonds, &u, &1.05.into(), &peri::bonds::Seen::default()));
+    bonds.sever(&overstretched(&bonds, &u, &1.05.into(), &peri::bonds::StretchScan::default()));
     assert!(bonds.directed_bonds() < all);
     let range = stretch_range(&bonds, &u);
     let range = [range.low, range.high].map(|e| (1.0 + e).sqrt()).map(|l| l + 1e-3 * (l - 1.0).signum());
@@ -154,7 +157,7 @@ fn compare_motion<const D: usize>(device: &Device, cells: [usize; D], critical: 
         Ok(())
     };
     solver.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut finished).unwrap();
-    assert_eq!(state.total_iterations, STEPS);
+    assert_eq!(state.counts.total_iterations, STEPS);
 
     let fit = KernelFit::new(&*law, [0.7, 1.25 * critical - 0.25], 1e-9).unwrap().clamped();
     let mut body = DeviceBody::new(device, &whole, &fit, MODULUS, Some(critical)).unwrap();
@@ -173,7 +176,7 @@ fn compare_motion<const D: usize>(device: &Device, cells: [usize; D], critical: 
     // 1e-9 of the true one
     let allowed = 4.0 * (STEPS as f64).sqrt() * device.precision().epsilon().max(1e-9) * reach;
     let name = format!("{D}D motion on {} in {:?}, m", device.name(), device.precision());
-    let broken = state.broken;
+    let broken = state.fracture.broken;
     eprintln!("{name}: {apart:.1e} of {allowed:.1e}; {broken} bonds broke, {margin:.1e} clear of doubt");
     assert!(
         broken > 10 && margin > 2.0 * allowed / whole.spacing(),

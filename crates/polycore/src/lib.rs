@@ -20,11 +20,13 @@
 
 pub mod constitutive;
 pub mod error;
+#[cfg(feature = "files")]
 pub mod file;
 #[cfg(feature = "hdf5")]
 pub mod hdf5;
 pub mod langevin;
 pub mod memory;
+pub mod numerics;
 pub mod posterior;
 pub mod random;
 #[cfg(feature = "tables")]

@@ -14,18 +14,9 @@
 //! integrals are kept, but which share a box has of a cell is as coarse as the points.
 
 use crate::Error;
+use crate::numerics::hexahedron::{CORNERS, shapes};
+use crate::numerics::{Groups, bounds};
 
-/// Corners of the reference cube in VTK's order.
-const CORNERS: [[f64; 3]; 8] = [
-    [-1.0, -1.0, -1.0],
-    [1.0, -1.0, -1.0],
-    [1.0, 1.0, -1.0],
-    [-1.0, 1.0, -1.0],
-    [-1.0, -1.0, 1.0],
-    [1.0, -1.0, 1.0],
-    [1.0, 1.0, 1.0],
-    [-1.0, 1.0, 1.0],
-];
 /// Corners this far from those of a box, over its edges, still make one.
 const ALIGNED: f64 = 1e-9;
 /// Boxes that overlap by less than this of an edge touch: rounding.
@@ -48,15 +39,10 @@ impl Cuboid {
         (0..3).map(|d| self.max[d] - self.min[d]).product()
     }
 
-    fn around(points: &[[f64; 3]]) -> Self {
-        let mut bounds = Self { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3] };
-        for point in points {
-            for d in 0..3 {
-                bounds.min[d] = bounds.min[d].min(point[d]);
-                bounds.max[d] = bounds.max[d].max(point[d]);
-            }
-        }
-        bounds
+    /// The box around points.
+    pub fn around(points: &[[f64; 3]]) -> Self {
+        let [min, max] = bounds(points.iter().copied());
+        Self { min, max }
     }
 }
 
@@ -74,9 +60,8 @@ struct Part {
 pub struct Overlap {
     cells: Vec<[u32; 8]>,
     nodes: usize,
-    /// Where the parts of each box begin, and where the last ends.
-    starts: Vec<usize>,
-    parts: Vec<Part>,
+    /// The parts of each box.
+    parts: Groups<Part>,
 }
 
 impl Overlap {
@@ -135,40 +120,28 @@ impl Overlap {
             // the order of bins is not that of boxes
             found[before..].sort_by_key(|(at, _)| *at);
         }
-        let mut starts = vec![0; boxes.len() + 1];
-        found.iter().for_each(|(at, _)| starts[*at as usize + 1] += 1);
-        (0..boxes.len()).for_each(|at| starts[at + 1] += starts[at]);
-        let mut next = starts.clone();
-        let mut parts = vec![Part { cell: 0, volume: 0.0, place: [0.0; 3] }; found.len()];
-        for (at, part) in found {
-            parts[next[at as usize]] = part;
-            next[at as usize] += 1;
-        }
-        Ok(Self { cells: cells.to_vec(), nodes: points.len(), starts, parts })
+        let parts = Groups::new(boxes.len(), found.iter().map(|&(at, part)| (at as usize, part)));
+        Ok(Self { cells: cells.to_vec(), nodes: points.len(), parts })
     }
 
     /// Number of boxes.
     pub fn boxes(&self) -> usize {
-        self.starts.len() - 1
-    }
-
-    fn parts_of(&self, index: usize) -> &[Part] {
-        &self.parts[self.starts[index]..self.starts[index + 1]]
+        self.parts.count()
     }
 
     /// Volume of the mesh in a box, m³.
     pub fn covered(&self, index: usize) -> f64 {
-        self.parts_of(index).iter().map(|part| part.volume).sum()
+        self.parts.of(index).iter().map(|part| part.volume).sum()
     }
 
     /// Nodes of the cells that have a part in a box.
     pub fn nodes_of(&self, index: usize) -> impl Iterator<Item = u32> + '_ {
-        self.parts_of(index).iter().flat_map(|part| self.cells[part.cell as usize])
+        self.parts.of(index).iter().flat_map(|part| self.cells[part.cell as usize])
     }
 
     /// Cells that have a part in a box.
     pub fn cells_of(&self, index: usize) -> impl Iterator<Item = u32> + '_ {
-        self.parts_of(index).iter().map(|part| part.cell)
+        self.parts.of(index).iter().map(|part| part.cell)
     }
 
     /// Means over the boxes of a field over cells; `None` where the mesh does not reach.
@@ -187,7 +160,7 @@ impl Overlap {
     pub fn from_nodes(&self, values: &[f64]) -> Result<Vec<Option<f64>>, Error> {
         fits("nodes", self.nodes, values)?;
         Ok(self.means(|part| {
-            let (nodes, shape) = (self.cells[part.cell as usize], shape(part.place));
+            let (nodes, shape) = (self.cells[part.cell as usize], shapes(part.place));
             (0..8).map(|a| shape[a] * values[nodes[a] as usize]).sum()
         }))
     }
@@ -200,7 +173,7 @@ impl Overlap {
         fits("boxes", self.boxes(), values)?;
         let mut sums = vec![(0.0, 0.0); self.cells.len()];
         for (index, value) in values.iter().enumerate() {
-            for part in self.parts_of(index) {
+            for part in self.parts.of(index) {
                 let (volume, sum) = &mut sums[part.cell as usize];
                 *volume += part.volume;
                 *sum += part.volume * value;
@@ -218,8 +191,8 @@ impl Overlap {
         fits("boxes", self.boxes(), values)?;
         let mut sums = vec![(0.0, 0.0); self.nodes];
         for (index, value) in values.iter().enumerate() {
-            for part in self.parts_of(index) {
-                let (nodes, shape) = (self.cells[part.cell as usize], shape(part.place));
+            for part in self.parts.of(index) {
+                let (nodes, shape) = (self.cells[part.cell as usize], shapes(part.place));
                 for a in 0..8 {
                     let (volume, sum) = &mut sums[nodes[a] as usize];
                     *volume += part.volume * shape[a];
@@ -233,7 +206,7 @@ impl Overlap {
     fn means(&self, value: impl Fn(&Part) -> f64) -> Vec<Option<f64>> {
         let of_box =
             |index| {
-                let parts = self.parts_of(index).iter();
+                let parts = self.parts.of(index).iter();
                 mean(parts.fold((0.0, 0.0), |(all, sum), part| {
                     (all + part.volume, sum + part.volume * value(part))
                 }))
@@ -269,7 +242,7 @@ pub fn integral(points: &[[f64; 3]], cells: &[[u32; 8]], values: &[f64]) -> Resu
         }
         let corners = cell.map(|node| points[node as usize]);
         for (part, _) in gauss_points(&corners, index as u32, 1) {
-            let shape = shape(part.place);
+            let shape = shapes(part.place);
             sums[0] += part.volume;
             sums[1] += part.volume * (0..8).map(|a| shape[a] * values[cell[a] as usize]).sum::<f64>();
         }
@@ -310,11 +283,6 @@ fn cut(cell: &Cuboid, other: &Cuboid, number: u32) -> Option<Part> {
     Some(Part { cell: number, volume, place })
 }
 
-/// Trilinear shape functions.
-fn shape(place: [f64; 3]) -> [f64; 8] {
-    CORNERS.map(|corner| (0..3).map(|d| 0.5 * (1.0 + corner[d] * place[d])).product())
-}
-
 /// Gauss points of a hexahedron in n³ pieces: volume and natural coordinates, and the point itself.
 fn gauss_points(corners: &[[f64; 3]; 8], number: u32, n: usize) -> Vec<(Part, [f64; 3])> {
     let step = 2.0 / n as f64;
@@ -326,7 +294,7 @@ fn gauss_points(corners: &[[f64; 3]; 8], number: u32, n: usize) -> Vec<(Part, [f
     for index in 0..8 * n * n * n {
         let place = [at(index % (2 * n)), at(index / (2 * n) % (2 * n)), at(index / (4 * n * n))];
         let (mut point, mut jacobian) = ([0.0; 3], [[0.0; 3]; 3]);
-        let shape = shape(place);
+        let shape = shapes(place);
         for (a, corner) in corners.iter().enumerate() {
             for d in 0..3 {
                 point[d] += shape[a] * corner[d];
@@ -351,8 +319,7 @@ struct Bins {
     edge: [f64; 3],
     least: [f64; 3],
     counts: [usize; 3],
-    starts: Vec<usize>,
-    boxes: Vec<usize>,
+    boxes: Groups<usize>,
 }
 
 impl Bins {
@@ -372,14 +339,10 @@ impl Bins {
             true => [1; 3],
             false => std::array::from_fn(|d| extent(d, edge[d]) as usize),
         };
-        let mut bins =
-            Self { origin: bounds.min, edge, least, counts, starts: Vec::new(), boxes: Vec::new() };
+        let boxes = Groups::new(0, std::iter::empty());
+        let mut bins = Self { origin: bounds.min, edge, least, counts, boxes };
         let place: Vec<usize> = middles.iter().map(|&middle| bins.index(bins.bin(middle))).collect();
-        bins.starts = vec![0; counts.iter().product::<usize>() + 1];
-        place.iter().for_each(|&bin| bins.starts[bin + 1] += 1);
-        (1..bins.starts.len()).for_each(|bin| bins.starts[bin] += bins.starts[bin - 1]);
-        bins.boxes = (0..boxes.len()).collect();
-        bins.boxes.sort_by_key(|&index| place[index]);
+        bins.boxes = Groups::new(counts.iter().product(), place.into_iter().zip(0..));
         bins
     }
 
@@ -396,7 +359,7 @@ impl Bins {
 
     /// Visits boxes that may reach into `bounds`, each once.
     fn within(&self, bounds: &Cuboid, visit: &mut dyn FnMut(usize)) {
-        if self.boxes.is_empty() {
+        if self.boxes.items().is_empty() {
             return;
         }
         // middles of boxes that reach in lie at most half an edge outside
@@ -405,7 +368,7 @@ impl Bins {
         for c in low[2]..=high[2] {
             for b in low[1]..=high[1] {
                 let (first, last) = (self.index([low[0], b, c]), self.index([high[0], b, c]));
-                self.boxes[self.starts[first]..self.starts[last + 1]].iter().for_each(|&index| visit(index));
+                self.boxes.between(first, last).iter().for_each(|&index| visit(index));
             }
         }
     }

@@ -1,7 +1,7 @@
-"""Distorted brick of `crystfem bench brick --distorted 0.2` by crystfem, scikit-fem and CalculiX on the same mesh.
+"""Distorted brick of `cargo xtask bench crystfem -- brick --distorted 0.2` by crystfem, scikit-fem and CalculiX on the same mesh.
 
 beside.py [--elements 99] [--step 0.5] [--steps 12] [--solvers NAME,...] [--rounds 1], from the root of the repository.
-Needs target/release/crystfem, ccx, and Python with scikit-fem and scipy (xtask/src/bench/brick.py runs on it).
+Needs cargo, ccx, and Python with scikit-fem and scipy (xtask/src/bench/brick.py runs on it).
 
 Prints user seconds of one thread. A step is the difference of a run of --steps and of one of 1 step (scikit-fem: all steps of a
 run but the first) over the number of steps between; set-up is all before the first step, for crystfem and CalculiX with making
@@ -20,7 +20,6 @@ import sys
 import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
-CRYSTFEM = ROOT / "target/release/crystfem"
 # of address space: a direct solver that wants more fails instead of exhausting the machine
 LIMIT = 12_000_000 * 1024
 # relative residuals of scikit-fem's Newton iteration and linear solves that leave about crystfem's error (1e-7 K rms a step), by step
@@ -63,6 +62,13 @@ def sides(mesh):
                 yield line.strip().split(",S")
 
 
+def executable():
+    """Of crates/crystfem/benches/measure.rs."""
+    build = ["cargo", "build", "--release", "--package=crystfem", "--bench=measure", "--message-format=json"]
+    lines = subprocess.run(build, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True).stdout.splitlines()
+    return [message["executable"] for message in map(json.loads, lines) if message.get("executable")][-1]
+
+
 def run(command, folder):
     """User seconds, peak memory in bytes, output; None where it fails."""
     environment = dict(os.environ, OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")
@@ -89,7 +95,7 @@ def main():
     options = parser.parse_args()
     folder, nodes = options.folder.resolve(), (options.elements + 1) ** 3
     folder.mkdir(parents=True, exist_ok=True)
-    bench = [CRYSTFEM, "bench", "brick", "--threads", 1, "--distorted", 0.2, "--elements", options.elements]
+    bench = [executable(), "brick", "--threads", 1, "--distorted", 0.2, "--elements", options.elements]
     bench += ["--step", options.step]
     run([*bench, "--steps", 1, "--mesh", "brick.inp"], folder)
 

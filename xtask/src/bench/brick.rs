@@ -1,4 +1,4 @@
-//! The brick of `crystfem bench brick`, and beside it, on the same mesh, CalculiX and scikit-fem.
+//! The brick of `crates/crystfem/benches/brick.rs`, and beside it, on the same mesh, CalculiX and scikit-fem.
 
 use std::path::{Path, PathBuf};
 
@@ -134,7 +134,7 @@ impl Runs {
         let rows = external(&self.program, &arguments)?;
         let of = |what: &str| rows.iter().find(|row| row.what == what).and_then(|row| row.value);
         let (Some(step), Some(mean)) = (of("step"), of("mean temperature")) else {
-            return Err(miette!("crystfem bench brick printed no time of a step"));
+            return Err(miette!("the brick printed no time of a step"));
         };
         Ok(Line {
             program: if lumped { "crystfem, lumped" } else { "crystfem" },

@@ -32,7 +32,7 @@ pub struct Run {
 }
 
 impl Mesh {
-    /// From a file as `crystfem bench brick --mesh` writes it.
+    /// From a file as `crates/crystfem/benches/brick.rs` writes it.
     pub fn new(file: &str, text: &str, nodes: u64) -> Self {
         let (mut sides, mut inside) = (Vec::new(), false);
         for line in text.lines() {

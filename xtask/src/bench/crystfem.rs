@@ -42,7 +42,7 @@ pub fn run(workspace: &Workspace, folder: &Path, arguments: &[String]) -> Result
         })
         .collect::<Result<_>>()?;
     let wanted = |name: &str| names.is_empty() || names.contains(&name);
-    let program = workspace.release("crystfem")?;
+    let program = workspace.bench("crystfem")?;
     let (mut all, mut text, mut passed) = (Vec::new(), String::new(), true);
     let mut take = |name: &str, rows: Vec<Row>| -> Result<()> {
         write(workspace, &format!("crystfem-{name}"), &rows)?;
@@ -64,7 +64,7 @@ pub fn run(workspace: &Workspace, folder: &Path, arguments: &[String]) -> Result
     Ok((all, text, passed))
 }
 
-/// One of the measurements of `crystfem bench`.
+/// One of the measurements of `crates/crystfem/benches/measure.rs`.
 struct Part {
     name: &'static str,
     title: &'static str,

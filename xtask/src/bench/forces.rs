@@ -5,7 +5,7 @@ use std::path::Path;
 use harness::output::csv;
 use miette::{IntoDiagnostic, Result, miette};
 
-/// Particles as `peri bench --block --state` writes them.
+/// Particles as `--block --state` of `crates/peri/benches/measure.rs` writes them.
 pub struct Snapshot {
     /// Reference positions, m.
     pub positions: Vec<[f64; 3]>,

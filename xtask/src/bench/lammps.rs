@@ -95,7 +95,8 @@ fn parse(text: &str) -> Option<Run> {
 /// Writes the input: in.pmb, particles at their reference positions, and the displaced coordinates.
 pub fn write_particles(folder: &Path, start: &Snapshot, spacing: f64) -> Result<()> {
     let count = start.positions.len();
-    let mut data = format!("the particles of peri bench --block\n\n{count} atoms\n1 atom types\n\n");
+    let mut data =
+        format!("the particles of cargo xtask bench peri -- --block\n\n{count} atoms\n1 atom types\n\n");
     for (d, name) in ["x", "y", "z"].into_iter().enumerate() {
         let high = start.positions.iter().map(|x| x[d]).fold(0.0, f64::max) + 0.5 * spacing;
         let _ = writeln!(data, "0 {high} {name}lo {name}hi");

@@ -11,7 +11,7 @@ use super::{Row, external};
 use crate::table::Table;
 use crate::workspace::Workspace;
 
-/// Distance of particles (m), horizon over it, bulk modulus (Pa): those of `peri bench --block`.
+/// Distance of particles (m), horizon over it, bulk modulus (Pa): those of `crates/peri/benches/block.rs`.
 const SPACING: f64 = 5e-4;
 const RATIO: f64 = 3.015;
 const BULK_MODULUS: f64 = 14.9e9;
@@ -34,7 +34,7 @@ const SAME: f64 = 1e-8;
 pub fn run(workspace: &Workspace, folder: &Path) -> Result<(Vec<Row>, String, bool)> {
     let mut peers = Peers {
         lammps: Lammps::find(workspace)?,
-        peri: workspace.release("peri")?,
+        peri: workspace.bench("peri")?,
         folder: folder.join("peri-peers"),
         rows: Vec::new(),
         same: true,
@@ -138,7 +138,7 @@ impl Peers {
             let rows = external(&self.peri, &arguments.map(str::to_owned))?;
             let of = |unit: &str| rows.iter().find(|row| row.unit == unit).and_then(|row| row.value);
             let (Some(found), Some(rate)) = (of("directed bonds"), of("particle·steps/s")) else {
-                return Err(miette!("peri bench --block printed no rates"));
+                return Err(miette!("--block printed no rates"));
             };
             bonds = found;
             if run.bonds as f64 != bonds {
@@ -184,7 +184,7 @@ impl Peers {
         Ok(start)
     }
 
-    /// What `peri bench --block` ends with; `flags` begin with the cells.
+    /// What `measure --block` ends with; `flags` begin with the cells.
     fn snapshot(&self, flags: &str) -> Result<Snapshot> {
         let path = self.folder.join("state.csv");
         let words = format!("--block {flags}");

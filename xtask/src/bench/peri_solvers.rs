@@ -26,7 +26,7 @@ struct Point {
 /// The rows, and a table of them; pictures go to `folder`/peri-solvers-{time,work}.png.
 pub fn run(workspace: &Workspace, folder: &Path, arguments: &[String]) -> Result<(Vec<Row>, String)> {
     let spacings = arguments.first().map_or(SPACINGS, String::as_str);
-    let rows = external(&workspace.release("peri")?, &["--solvers".to_owned(), spacings.to_owned()])?;
+    let rows = external(&workspace.bench("peri")?, &["--solvers".to_owned(), spacings.to_owned()])?;
     let curves = curves(&rows)?;
     let mut table = Table::new([
         "particles",
@@ -61,7 +61,7 @@ type Curves = BTreeMap<(u64, String), Vec<Point>>;
 fn curves(rows: &[Row]) -> Result<Curves> {
     let mut curves = Curves::new();
     for row in rows {
-        let unknown = || miette!("peri bench --solvers printed a row `{}`", row.what);
+        let unknown = || miette!("--solvers printed a row `{}`", row.what);
         let (method, rest) = row.what.split_once(' ').ok_or_else(unknown)?;
         let (tolerance, quantity) = rest.split_once(": ").ok_or_else(unknown)?;
         let value = row.value.ok_or_else(unknown)?;

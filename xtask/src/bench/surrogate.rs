@@ -23,8 +23,9 @@ const POINTS: usize = 512;
 /// Rows; what a peer cannot measure here is named in a row without a value.
 pub fn run(workspace: &Workspace, folder: &Path) -> Result<Vec<Row>> {
     let program = workspace.release("mdsurrogate")?;
-    let mut rows = external(&program, &[])?;
-    rows.extend(external(&program, &["--training".to_owned()])?);
+    let bench = workspace.bench("mdsurrogate")?;
+    let mut rows = external(&bench, &[])?;
+    rows.extend(external(&bench, &["--training".to_owned()])?);
     let folder = folder.join("mdsurrogate");
     let path = |name: &str| folder.join(name).display().to_string();
     let (law, strains, answers) = (path("ANN-4.safetensors"), path("strains.csv"), path("answers.csv"));

@@ -7,7 +7,7 @@ use std::path::Path;
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
 use serde::{Deserialize, Serialize};
 
-use crate::validate::outcome::Outcome;
+use crate::outcome::Outcome;
 
 /// Relative changes below this are rounding of another machine or instruction set.
 const STILL: f64 = 1e-6;
@@ -137,7 +137,7 @@ fn percent(before: f64, now: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::validate::outcome::tests::{outcome, report};
+    use crate::outcome::tests::{outcome, report};
 
     #[test]
     fn what_moved() {

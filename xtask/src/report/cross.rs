@@ -1,132 +1,50 @@
 //! Comparisons with programs that nobody here wrote. One that was not made is named, with what makes it.
 
-use serde::Serialize;
+use std::fs;
+
+use miette::{IntoDiagnostic, Result, WrapErr};
+use serde::{Deserialize, Serialize};
 
 use crate::bench::{self, Bench, Row};
 use crate::test::{self, Record};
 use crate::workspace::Workspace;
 
+/// The comparisons.
+const FILE: &str = "cases/peers.toml";
+
+#[derive(Deserialize)]
+struct Checks {
+    bench: Vec<Check>,
+    test: Vec<Tested>,
+}
+
 /// A comparison by a bench.
+#[derive(Deserialize)]
 struct Check {
-    title: &'static str,
+    title: String,
     /// Rows of target/bench/NAME.json …
-    bench: &'static str,
+    bench: String,
     /// … of which one holds all of these words.
-    words: &'static [&'static str],
+    words: Vec<String>,
     /// The largest number that counts as agreement; none where the difference has a stated cause.
     agree: f64,
-    command: &'static str,
-    needs: &'static str,
+    command: String,
+    needs: String,
 }
-
-const CHECKS: &[Check] = &[
-    Check {
-        title: "LAMMPS peri/pmb: forces, particle by particle",
-        bench: "peri-peers",
-        words: &["forces, partial volumes: max"],
-        // the tolerance of `bench peri-peers`: the bound of the fitted law, ten bonds' worth
-        agree: 1e-8,
-        command: "cargo xtask bench peri-peers",
-        needs: "LAMMPS in target/venv-lammps (docs/guide/src/how-to/bench.md)",
-    },
-    Check {
-        title: "LAMMPS peri/pmb: forces after velocity-Verlet steps",
-        bench: "peri-peers",
-        words: &["forces, partial volumes, after", "max"],
-        agree: 1e-8,
-        command: "cargo xtask bench peri-peers",
-        needs: "LAMMPS in target/venv-lammps (docs/guide/src/how-to/bench.md)",
-    },
-    Check {
-        title: "CalculiX: temperatures, node by node",
-        bench: "crystfem-brick",
-        words: &["calculix", "largest difference"],
-        // twice what it prints
-        agree: 1e-4,
-        command: "cargo xtask bench crystfem -- brick",
-        needs: "Debian's calculix-ccx",
-    },
-    Check {
-        title: "scikit-fem: temperatures, node by node",
-        bench: "crystfem-brick",
-        words: &["scikit-fem", "largest difference"],
-        // what Newton's iterations of both leave
-        agree: 1e-5,
-        command: "cargo xtask bench crystfem -- brick",
-        needs: "scikit-fem from PyPI",
-    },
-    Check {
-        title: "PyTorch: stresses and tangents of a trained ANN-4",
-        bench: "mdsurrogate",
-        words: &["pytorch", "largest difference"],
-        // some hundred roundings of doubles in another order, as for exported C
-        agree: 1e-12,
-        command: "cargo xtask bench mdsurrogate",
-        needs: "PyTorch in the Python that TORCH_PYTHON names",
-    },
-    Check {
-        title: "onnxruntime: stresses of the exported ANN-4",
-        bench: "mdsurrogate",
-        words: &["onnxruntime", "largest difference"],
-        agree: 1e-12,
-        command: "cargo xtask bench mdsurrogate",
-        needs: "onnxruntime in the Python that ONNX_PYTHON names",
-    },
-];
 
 /// A comparison by a test that runs the other program.
+#[derive(Deserialize)]
 struct Tested {
-    title: &'static str,
+    title: String,
     /// The name of its number, as the test gives it by crate `evidence`.
-    record: &'static str,
-    needs: &'static str,
+    record: String,
+    needs: String,
 }
-
-const LAMMPS: &str = "LAMMPS in the Python that PERI_LAMMPS_PYTHON names";
-const CALCULIX: &str = "CalculiX built from source, CALCULIX_SOURCE";
-
-const TESTS: &[Tested] = &[
-    Tested {
-        title: "LAMMPS: bond tables, forces of the self-check state over their rms",
-        record: "forces in LAMMPS over their rms",
-        needs: LAMMPS,
-    },
-    Tested {
-        title: "LAMMPS: loads of a strip that tears, every step before it parts",
-        record: "loads of a torn strip in LAMMPS",
-        needs: LAMMPS,
-    },
-    Tested {
-        title: "CalculiX with UMATHT: temperatures of crystallization at 10 K/min, K",
-        record: "crystallization in CalculiX, K",
-        needs: CALCULIX,
-    },
-    Tested {
-        title: "CalculiX with UMATHT: temperatures of a printed bar, node by node, K",
-        record: "printed bar in CalculiX, K",
-        needs: CALCULIX,
-    },
-    Tested {
-        title: "CalculiX with UMAT: load of a notched sheet, our neo-Hookean law over its own",
-        record: "notched sheet in CalculiX: our neo-Hookean law over CalculiX' own",
-        needs: CALCULIX,
-    },
-    Tested {
-        title: "CalculiX with UMAT: stress at the centre of a cooling plate of PA12, over the series",
-        record: "plate of PA12 in CalculiX, held, centre",
-        needs: CALCULIX,
-    },
-    Tested {
-        title: "CalculiX with a learnt law: stresses along a path with softening, over their norm",
-        record: "a learnt law in CalculiX, stresses",
-        needs: CALCULIX,
-    },
-];
 
 /// A comparison as made, or why it was not.
 #[derive(Serialize)]
 pub struct Crossed {
-    title: &'static str,
+    title: String,
     what: String,
     value: String,
     asked: String,
@@ -134,31 +52,37 @@ pub struct Crossed {
     measured: String,
     verdict: &'static str,
     tone: &'static str,
-    command: &'static str,
-    needs: &'static str,
+    command: String,
+    needs: String,
 }
 
 impl Crossed {
     /// For docs/validation.md.
     pub fn cells(&self) -> [String; 5] {
-        [self.title, &self.value, &self.asked, self.verdict, &self.measured].map(str::to_owned)
+        [&self.title, &self.value, &self.asked, self.verdict, &self.measured].map(str::to_owned)
     }
 }
 
 /// All comparisons, from the rows that benches and the numbers that tests have left.
-pub fn checked(workspace: &Workspace) -> Vec<Crossed> {
+pub fn checked(workspace: &Workspace) -> Result<Vec<Crossed>> {
+    let checks = read(workspace)?;
     let made = |check: &Check| {
-        let bench = bench::read(workspace, check.bench);
+        let bench = bench::read(workspace, &check.bench);
         let fresh = bench.as_ref().is_some_and(|bench| bench.stamp.fresh(workspace.root()));
         check.made(bench.as_ref(), fresh)
     };
     let records = test::read(workspace);
     let tested = |tested: &Tested| {
-        let record = records.get(tested.record);
+        let record = records.get(&tested.record);
         let stamp = record.and_then(|record| record.stamp.as_ref());
         tested.made(record, stamp.is_some_and(|stamp| stamp.fresh(workspace.root())))
     };
-    CHECKS.iter().map(made).chain(TESTS.iter().map(tested)).collect()
+    Ok(checks.bench.iter().map(made).chain(checks.test.iter().map(tested)).collect())
+}
+
+fn read(workspace: &Workspace) -> Result<Checks> {
+    let text = fs::read_to_string(workspace.root().join(FILE)).into_diagnostic().wrap_err(FILE)?;
+    toml::from_str(&text).into_diagnostic().wrap_err(FILE)
 }
 
 /// Verdict and tone.
@@ -176,15 +100,15 @@ impl Tested {
         let (verdict, tone) = record.map_or(("skipped", "open"), |record| judged(record.met, fresh));
         let stamp = record.and_then(|record| record.stamp.as_ref());
         Crossed {
-            title: self.title,
+            title: self.title.clone(),
             what: record.map(|record| record.test.clone()).unwrap_or_default(),
             value,
             asked,
             measured: stamp.map(ToString::to_string).unwrap_or_default(),
             verdict,
             tone,
-            command: "cargo xtask test",
-            needs: self.needs,
+            command: "cargo xtask test".to_owned(),
+            needs: self.needs.clone(),
         }
     }
 }
@@ -211,15 +135,15 @@ impl Check {
             None => (String::new(), String::new(), "skipped", "open"),
         };
         Crossed {
-            title: self.title,
+            title: self.title.clone(),
             what,
             value: value.trim_end().to_owned(),
             asked: format!("≤ {:e}", self.agree),
             measured: bench.map(|bench| bench.stamp.to_string()).unwrap_or_default(),
             verdict,
             tone,
-            command: self.command,
-            needs: self.needs,
+            command: self.command.clone(),
+            needs: self.needs.clone(),
         }
     }
 }
@@ -231,7 +155,8 @@ mod tests {
 
     #[test]
     fn made_skipped_disagreeing_and_stale() {
-        let check = &CHECKS[0];
+        let workspace = Workspace::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..").into());
+        let check = &read(&workspace).expect(FILE).bench[0];
         assert_eq!(check.made(None, false).verdict, "skipped");
         let root = tempfile::tempdir().expect("a folder");
         let bench = |value: f64| {

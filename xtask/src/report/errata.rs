@@ -5,8 +5,7 @@ use std::fs;
 use miette::{IntoDiagnostic, Result, WrapErr};
 use serde::{Deserialize, Serialize};
 
-use super::evidence::{Finding, Measured, Number, verdict};
-use super::thesis::{self, Found};
+use super::evidence::{Finding, Found, Measured, Number, check, verdict};
 use crate::workspace::Workspace;
 
 /// What proves an erratum.
@@ -109,7 +108,7 @@ pub fn faults(workspace: &Workspace, rows: &[Erratum], proofs: &[Proof]) -> Vec<
         if proof.numbers.is_empty() && proof.tests.is_empty() {
             fault("has no number".to_owned());
         }
-        thesis::check(workspace, proof.case.as_deref(), &proof.numbers, &proof.tests, &mut fault);
+        check(workspace, proof.case.as_deref(), &proof.numbers, &proof.tests, &mut fault);
     }
     faults
 }

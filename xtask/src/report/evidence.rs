@@ -1,11 +1,16 @@
 //! What a verdict rests on: quantities that cases are judged by, or numbers that tests have measured.
 
+use std::collections::BTreeMap;
+use std::fs;
 use std::path::Path;
 
+use harness::report::{Expect, Kind};
+use miette::{Result, miette};
 use serde::{Deserialize, Serialize};
 
+use crate::outcome::Outcome;
 use crate::test::Records;
-use crate::validate::outcome::Outcome;
+use crate::workspace::Workspace;
 
 /// A quantity of a case, as named in cases/thesis.toml.
 #[derive(Clone, Debug, Deserialize)]
@@ -156,6 +161,89 @@ impl Measured {
         let [value, asked] = record.cells();
         Finding { value, asked, ..empty(state, from) }
     }
+}
+
+/// What was found: by this run's cases, and by the last run of the tests.
+pub struct Found<'a> {
+    /// Of the cases.
+    pub outcomes: &'a [Outcome],
+    /// Of the tests.
+    pub records: &'a Records,
+    /// Of the workspace.
+    pub root: &'a Path,
+}
+
+impl Found<'_> {
+    /// Looks numbers up.
+    pub fn findings(&self, case: Option<&str>, numbers: &[Number], tests: &[Measured]) -> Vec<Finding> {
+        let found = numbers.iter().map(|number| number.find(case, self.outcomes));
+        found.chain(tests.iter().map(|test| test.find(self.records, self.root))).collect()
+    }
+}
+
+/// Adds what is wrong with numbers and tests.
+pub fn check(
+    workspace: &Workspace,
+    case: Option<&str>,
+    numbers: &[Number],
+    tests: &[Measured],
+    fault: &mut dyn FnMut(String),
+) {
+    let (mut evidence, mut regressions) = (tests.len(), 0);
+    for number in numbers {
+        let Some(case) = number.case.as_deref().or(case) else {
+            fault(format!("`{}` names no case", number.quantity));
+            continue;
+        };
+        match expected(workspace, case) {
+            Err(error) => fault(error.to_string()),
+            Ok(kinds) if number.judged => match kinds.get(&number.quantity) {
+                None => fault(format!("{case} expects no `{}`", number.quantity)),
+                Some(kinds) if kinds.iter().any(|kind| kind.is_evidence()) => evidence += 1,
+                Some(_) => regressions += 1,
+            },
+            Ok(_) => {}
+        }
+    }
+    if evidence == 0 && regressions > 0 {
+        fault("rests only on our own earlier figures (kind = \"regression\")".to_owned());
+    }
+    for test in tests {
+        if !named(workspace, &test.record) {
+            fault(format!("no test in crates/ measures \"{}\"", test.record));
+        }
+    }
+}
+
+/// The quantities that a case expects, and of what kinds.
+fn expected(workspace: &Workspace, case: &str) -> Result<BTreeMap<String, Vec<Kind>>> {
+    let path = workspace.root().join("cases").join(case).join("case.toml");
+    let text = fs::read_to_string(&path).map_err(|error| miette!("cases/{case}/case.toml: {error}"))?;
+    let table: toml::Table = toml::from_str(&text).map_err(|error| miette!("{case}: {error}"))?;
+    let mut kinds = BTreeMap::<String, Vec<Kind>>::new();
+    for expect in table.get("expect").and_then(toml::Value::as_array).into_iter().flatten() {
+        let expect: Expect = expect.clone().try_into().map_err(|error| miette!("{case}: {error}"))?;
+        kinds.entry(expect.quantity).or_default().push(expect.kind);
+    }
+    Ok(kinds)
+}
+
+/// Whether a file below crates/ or tests/ gives a number that name: a link, not a proof.
+fn named(workspace: &Workspace, record: &str) -> bool {
+    let name = format!("\"{record}\"");
+    let mut folders = vec![workspace.root().join("crates"), workspace.root().join("tests")];
+    while let Some(folder) = folders.pop() {
+        for path in fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()) {
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|extension| extension == "rs")
+                && fs::read_to_string(&path).is_ok_and(|text| text.contains(&name))
+            {
+                return true;
+            }
+        }
+    }
+    false
 }
 
 #[cfg(test)]

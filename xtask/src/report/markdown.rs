@@ -3,9 +3,9 @@
 use harness::report::Kind;
 
 use super::Page;
+use crate::outcome::Outcome;
+use crate::summary;
 use crate::table::Table;
-use crate::validate::outcome::Outcome;
-use crate::validate::summary;
 
 /// Sums, thesis map, links between scales, cases, fronts, cross-checks.
 pub fn text(page: &Page, outcomes: &[Outcome]) -> String {

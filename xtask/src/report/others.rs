@@ -3,7 +3,7 @@
 use harness::report::Kind;
 use serde::Serialize;
 
-use crate::validate::outcome::Outcome;
+use crate::outcome::Outcome;
 
 /// The folder of cases/.
 const FOLDER: &str = "external/";
@@ -67,7 +67,7 @@ pub fn figures(outcomes: &[Outcome]) -> Vec<Other> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::validate::outcome::tests::{outcome, report};
+    use crate::outcome::tests::{outcome, report};
 
     #[test]
     fn figures_of_cases_in_the_folder() {

@@ -5,7 +5,7 @@ use std::time::SystemTime;
 
 use harness::view;
 
-use crate::validate::outcome::Outcome;
+use crate::outcome::Outcome;
 
 /// Writes the page of a case that wrote fields of a fracture or a print, where its results are newer, and gives its path.
 /// None where there is nothing to turn.

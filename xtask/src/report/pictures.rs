@@ -9,7 +9,7 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use serde::Serialize;
 
-use crate::validate::outcome::Outcome;
+use crate::outcome::Outcome;
 
 /// Pixels across of the widest picture; pages are about 900 wide, and pictures of finer screens gain little.
 const WIDTH: u32 = 1100;

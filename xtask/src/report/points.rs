@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use harness::report::Value;
 
 use crate::bench::Row;
-use crate::validate::outcome::Outcome;
+use crate::outcome::Outcome;
 
 /// Rows of errors with the rows of times of the same point, of the largest size that has both: name, time, error.
 pub fn pairs(rows: &[Row], error: &str, time: &str) -> Vec<(String, f64, f64)> {

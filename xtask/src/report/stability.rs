@@ -7,7 +7,7 @@ use std::path::Path;
 use harness::report::Judgement;
 use serde::{Deserialize, Serialize};
 
-use crate::validate::outcome::Outcome;
+use crate::outcome::Outcome;
 
 /// Words in the names of cases whose every run is such a thing, though their scenes have no `description`.
 const WORDS: [&str; 2] = ["stability", "extremes"];

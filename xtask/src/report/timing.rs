@@ -5,303 +5,67 @@ use std::fs;
 use std::path::Path;
 
 use harness::output::picture::{LinePlot, Series};
-use miette::{IntoDiagnostic, Result};
-use serde::Serialize;
+use miette::{IntoDiagnostic, Result, WrapErr};
+use serde::{Deserialize, Serialize};
 
 use super::pictures;
 use super::points::{of_curves, of_table, pairs};
 use crate::bench;
+use crate::outcome::Outcome;
 use crate::stamp::Stamp;
-use crate::validate::outcome::Outcome;
 use crate::workspace::Workspace;
 
+/// The alternatives, cases/timing.toml.
+const FILE: &str = "cases/timing.toml";
+
 /// Where the points of a subject are.
+#[derive(Deserialize)]
+#[serde(rename_all = "lowercase", deny_unknown_fields)]
 enum Source {
     /// Rows of target/bench/NAME.json: what distinguishes those of errors and those of times, the rest being a point.
-    Bench { name: &'static str, error: &'static str, time: &'static str },
+    Bench { name: String, error: String, time: String },
     /// A table among a case's results: a method a row, its name in the first column; these columns, the times multiplied.
-    Table { case: &'static str, file: &'static str, error: usize, time: usize, scale: f64 },
+    Table { case: String, file: String, error: usize, time: usize, scale: f64 },
     /// Curves of a case's report: columns `seconds` and, last, errors.
-    Case { case: &'static str, curves: &'static str },
+    Case { name: String, curves: String },
+}
+
+#[derive(Deserialize)]
+struct Subjects {
+    subject: Vec<Subject>,
 }
 
 /// Alternatives for one thing.
+#[derive(Deserialize)]
 struct Subject {
-    title: &'static str,
+    title: String,
+    #[serde(flatten)]
     source: Source,
     /// What separates the name of a method from its setting in a point's name.
-    split: &'static str,
+    #[serde(default = "line_break")]
+    split: String,
     /// The method that is taken where a scene names none.
-    default: &'static str,
-    axes: [&'static str; 2],
+    default: String,
+    axes: [String; 2],
     /// What measures it.
-    command: &'static str,
-    note: &'static str,
+    command: String,
+    #[serde(default)]
+    note: String,
 }
 
-const SUBJECTS: &[Subject] = &[
-    Subject {
-        title: "Inverse Langevin functions",
-        source: Source::Bench { name: "langevin", error: "largest relative error", time: "time" },
-        split: "\n",
-        default: "exact",
-        axes: ["ns per call", "largest relative error over (0, 1)"],
-        command: "cargo xtask bench langevin",
-        note: "",
-    },
-    Subject {
-        title: "Evaluation of the bond law",
-        source: Source::Bench { name: "peri-laws", error: "largest error", time: "time" },
-        split: " with ",
-        default: "fitted",
-        axes: ["ns per bond", "largest error / rms tension"],
-        command: "cargo xtask bench peri-laws",
-        note: "Law `chain-offset`, one stretch after the other; the kernels evaluate the fit for eight bonds at once. Newton is the exact law.",
-    },
-    Subject {
-        title: "Stress measures and corrections",
-        source: Source::Case { case: "ch2/plate-convergence", curves: "error_against_time_" },
-        split: "\n",
-        default: "spline [m=3.015]",
-        axes: ["s, whole solution", "RMSE of the normalized stress, Eq. (2.84), loaded layers left out"],
-        command: "cargo xtask validate --case cases/ch2/plate-convergence",
-        note: "The plate with a hole against its own series solution at several spacings; each curve is one measure, horizon and correction.",
-    },
-    Subject {
-        title: "Quasi-static solvers",
-        source: Source::Bench { name: "peri-solvers", error: "error", time: "time" },
-        split: " ",
-        default: "lbfgs",
-        axes: ["s", "largest error / rms displacement"],
-        command: "cargo xtask bench peri-solvers",
-        note: "The plate with a hole on the finest lattice that was measured; a point for each tolerance of the residual.",
-    },
-    Subject {
-        title: "Fracture: what breaks",
-        source: Source::Case { case: "ch2/dent-events", curves: "error_against_time_" },
-        split: "\n",
-        default: "peak_load [m=3.015 lbfgs]",
-        axes: ["s, whole solution", "error of the peak load"],
-        command: "cargo xtask validate --case cases/ch2/dent-events",
-        note: "A notched sheet torn apart, against a residual of 1e-8; a point for each tolerance of the residual.",
-    },
-    Subject {
-        title: "Fracture: load steps",
-        source: Source::Case { case: "ch2/dent-steps", curves: "error_against_time_" },
-        split: "\n",
-        default: "peak_load [m=3.015 refine]",
-        axes: ["s, whole solution", "error of the peak load"],
-        command: "cargo xtask validate --case cases/ch2/dent-steps",
-        note: "The same sheet against an independent program; a point for each number of steps, and for each `refine` of 15 steps.",
-    },
-    Subject {
-        title: "Fracture: a response that snaps back",
-        source: Source::Case { case: "ch2/dent-snap-back", curves: "error_against_time_" },
-        split: "\n",
-        default: "released_energy [m=3.015 refine]",
-        axes: ["s, whole solution", "error of the energy of broken bonds"],
-        command: "cargo xtask validate --case cases/ch2/dent-snap-back",
-        note: "The same sheet torn along its equilibria, against an independent program; a point for each `refine`, and one for a displacement that is held.",
-    },
-    Subject {
-        title: "Fracture: spacing",
-        source: Source::Case { case: "ch2/dent-convergence", curves: "error_against_time_" },
-        split: "\n",
-        default: "peak_load [m=3.015 G]",
-        axes: ["s, whole solution", "difference of the peak load from that at Δx = 1 mm"],
-        command: "cargo xtask validate --case cases/ch2/dent-convergence",
-        note: "The same sheet with a given fracture energy; a point for each spacing.",
-    },
-    Subject {
-        title: "Contact",
-        source: Source::Case { case: "ch2/contact-series", curves: "error_against_time_" },
-        split: "\n",
-        default: "peak_load [m=1 adr]",
-        axes: ["s, whole solution", "error of the force against a rigid contact"],
-        command: "cargo xtask validate --case cases/ch2/contact-series",
-        note: "Springs in series, one of them the contact; a point for each stiffness of the contact.",
-    },
-    Subject {
-        title: "Explicit dynamics",
-        source: Source::Case { case: "ch2/verlet-steps", curves: "error_against_time_" },
-        split: "\n",
-        default: "largest_displacement [m=1 verlet]",
-        axes: ["s, whole solution", "error of the displacement"],
-        command: "cargo xtask validate --case cases/ch2/verlet-steps",
-        note: "Linear oscillators; a point for each time step.",
-    },
-    Subject {
-        title: "Integrators of Nakamura's law",
-        source: Source::Bench { name: "crystfem-kinetics", error: "error", time: "time" },
-        split: " ",
-        default: "z-gauss2",
-        axes: ["s, whole curve", "largest error in α"],
-        command: "cargo xtask bench crystfem -- kinetics",
-        note: "PA12 cooled from 200 to 120 °C; a point for each length of steps, K. Schemes that leave [0, 1] have no point there.",
-    },
-    Subject {
-        title: "Time integrators of heat conduction, smooth",
-        source: Source::Bench { name: "crystfem-integrators", error: "error, smooth", time: "time, smooth" },
-        split: " ",
-        default: "tr-bdf2-adaptive",
-        axes: ["s", "rms error, K"],
-        command: "cargo xtask bench crystfem -- integrators",
-        note: "A cube that cools from an eigenvector of its finite elements; a point for each number of steps or tolerance.",
-    },
-    Subject {
-        title: "Time integrators of heat conduction, quenched",
-        source: Source::Bench {
-            name: "crystfem-integrators",
-            error: "error, quenched",
-            time: "time, quenched",
-        },
-        split: " ",
-        default: "tr-bdf2-adaptive",
-        axes: ["s", "rms error, K"],
-        command: "cargo xtask bench crystfem -- integrators",
-        note: "The same cube, quenched at three faces.",
-    },
-    Subject {
-        title: "Linear solvers of heat conduction, short steps",
-        source: Source::Bench {
-            name: "crystfem-solvers",
-            error: "error, 0.5 s a step",
-            time: "time, 0.5 s a step",
-        },
-        split: " ",
-        default: "cg",
-        axes: ["s per step", "rms error, K"],
-        command: "cargo xtask bench crystfem -- solvers",
-        note: "The quenched cube of 27³ nodes, 0.5 s a step; a point for each tolerance. Factors are made before.",
-    },
-    Subject {
-        title: "Linear solvers of heat conduction, long steps",
-        source: Source::Bench {
-            name: "crystfem-solvers",
-            error: "error, 50 s a step",
-            time: "time, 50 s a step",
-        },
-        split: " ",
-        default: "cg",
-        axes: ["s per step", "rms error, K"],
-        command: "cargo xtask bench crystfem -- solvers",
-        note: "The same with 50 s a step.",
-    },
-    Subject {
-        title: "Crystallization with births, over the step",
-        source: Source::Case { case: "ch4/error-against-time", curves: "error_against_time_step-" },
-        split: "\n",
-        default: "adaptive",
-        axes: ["s of the solution", "rms error of the layers' mean α"],
-        command: "cargo xtask validate --case cases/ch4/error-against-time",
-        note: "A bar of three layers that crystallizes, melts and gives off heat while it is printed; a point for each step or tolerance. The truth is the same program at a tolerance of 1e-4 K.",
-    },
-    Subject {
-        title: "Crystallization with births, over the mesh",
-        source: Source::Case { case: "ch4/error-against-time", curves: "error_against_time_mesh-" },
-        split: "\n",
-        default: "hex8",
-        axes: ["s of the solution", "rms error of the layers' mean α"],
-        command: "cargo xtask validate --case cases/ch4/error-against-time",
-        note: "The same bar on grids of 1 to 6 elements a layer; six tetrahedra fill a cell. The truth is hexahedra, 12 a layer.",
-    },
-    Subject {
-        title: "Warpage of a print, over the step",
-        source: Source::Case { case: "ch5/print-warpage", curves: "error_against_time_cold-" },
-        split: "\n",
-        default: "over-tolerance",
-        axes: ["s of the solution", "error of the warpage, m"],
-        command: "cargo xtask validate --case cases/ch5/print-warpage",
-        note: "A bar in a cold chamber whose warpage is 0.21 mm; a point for each temporal tolerance of the temperature. The truth is the same program at 0.02 K.",
-    },
-    Subject {
-        title: "Latent heat",
-        source: Source::Case { case: "ch4/freezing", curves: "error_against_time_latent-" },
-        split: "\n",
-        default: "width-of-mesh",
-        axes: ["s of the solution", "rms error, K"],
-        command: "cargo xtask validate --case cases/ch4/freezing",
-        note: "Freezing with latent heat as a peak of c(T), against Neumann's closed form; a point for each mesh, or each tolerance.",
-    },
-    Subject {
-        title: "Surrogate models: training",
-        source: Source::Table {
-            case: "ch3/train-default",
-            file: "error_against_time.csv",
-            error: 1,
-            time: 2,
-            scale: 1.0,
-        },
-        split: "\n",
-        default: "energy",
-        axes: ["s of training", "error (3.12) on test runs, MPa²"],
-        command: "cargo xtask validate --case cases/ch3/train-default",
-        note: "Laws learnt from the shipped molecular dynamics, split by path.",
-    },
-    Subject {
-        title: "Surrogate models: inference",
-        source: Source::Table {
-            case: "ch3/train-default",
-            file: "error_against_time.csv",
-            error: 1,
-            time: 3,
-            scale: 1e6,
-        },
-        split: "\n",
-        default: "energy",
-        axes: ["µs per stress", "error (3.12) on test runs, MPa²"],
-        command: "cargo xtask validate --case cases/ch3/train-default",
-        note: "The same laws, one stress at a time.",
-    },
-    Subject {
-        title: "Surrogate models on a known law: training",
-        source: Source::Table {
-            case: "ch3/known-law",
-            file: "error_against_time.csv",
-            error: 1,
-            time: 2,
-            scale: 1.0,
-        },
-        split: "_",
-        default: "energy",
-        axes: ["s of training", "error (3.12) on unseen runs, MPa²"],
-        command: "cargo xtask validate --case cases/ch3/known-law",
-        note: "An orthotropic, softening law without noise; of each kind five networks, the larger trained for longer.",
-    },
-    Subject {
-        title: "Surrogate models on a known law: inference",
-        source: Source::Table {
-            case: "ch3/known-law",
-            file: "error_against_time.csv",
-            error: 1,
-            time: 3,
-            scale: 1e6,
-        },
-        split: "_",
-        default: "energy",
-        axes: ["µs per stress", "error (3.12) on unseen runs, MPa²"],
-        command: "cargo xtask validate --case cases/ch3/known-law",
-        note: "The same networks, one stress at a time.",
-    },
-    Subject {
-        title: "Searches for hyperparameters",
-        source: Source::Case { case: "ch3/search-methods", curves: "error_against_time_" },
-        split: "\n",
-        default: "hyperband",
-        axes: ["s of training", "best validation loss (3.12) so far, MPa²"],
-        command: "cargo xtask validate --case cases/ch3/search-methods",
-        note: "γ-PA12, a part of Table 3.3; medians of three seeds at equal epochs, against candidates at random.",
-    },
-];
+/// Splits no name.
+fn line_break() -> String {
+    "\n".to_owned()
+}
 
 /// A subject as measured.
 #[derive(Serialize)]
 pub struct Measured {
-    title: &'static str,
-    axes: [&'static str; 2],
-    default: &'static str,
-    command: &'static str,
-    note: &'static str,
+    title: String,
+    axes: [String; 2],
+    default: String,
+    command: String,
+    note: String,
     points: Vec<Point>,
     /// Whether a point of the default is on the front.
     default_on_front: bool,
@@ -345,7 +109,7 @@ impl Measured {
         let stale = if self.stale { "stale; " } else { "" };
         let measured = self.measured.as_deref().unwrap_or("this run");
         let cells = [
-            self.title.to_owned(),
+            self.title.clone(),
             front.join(", "),
             format!("{stale}{}: {verdict}", self.default),
             measured.to_owned(),
@@ -354,41 +118,44 @@ impl Measured {
     }
 
     /// What was not measured, and by what it is.
-    pub fn absent(&self) -> [&'static str; 2] {
-        [self.title, self.command]
+    pub fn absent(&self) -> [&str; 2] {
+        [&self.title, &self.command]
     }
 }
 
 /// Everything that was measured, and by what command the rest is; pictures go to `folder`.
 pub fn measured(workspace: &Workspace, folder: &Path, outcomes: &[Outcome]) -> Result<Vec<Measured>> {
-    SUBJECTS.iter().map(|subject| subject.measured(workspace, folder, outcomes)).collect()
+    let path = workspace.root().join(FILE);
+    let text = fs::read_to_string(&path).into_diagnostic().wrap_err(FILE)?;
+    let subjects: Subjects = toml::from_str(&text).into_diagnostic().wrap_err(FILE)?;
+    subjects.subject.into_iter().map(|subject| subject.measured(workspace, folder, outcomes)).collect()
 }
 
 impl Subject {
-    fn measured(&self, workspace: &Workspace, folder: &Path, outcomes: &[Outcome]) -> Result<Measured> {
+    fn measured(self, workspace: &Workspace, folder: &Path, outcomes: &[Outcome]) -> Result<Measured> {
         let mut stamp: Option<Stamp> = None;
-        let points = match self.source {
+        let points = match &self.source {
             Source::Bench { name, error, time } => {
                 let bench = bench::read(workspace, name);
                 stamp = bench.as_ref().map(|bench| bench.stamp.clone());
                 pairs(bench.as_ref().map_or(&[], |bench| &bench.rows), error, time)
             }
             Source::Table { case, file, error, time, scale } => {
-                let outcome = outcomes.iter().find(|outcome| outcome.case == case);
+                let outcome = outcomes.iter().find(|outcome| outcome.case == *case);
                 let path = outcome.map(|outcome| outcome.output.join(file));
                 let text = path.and_then(|path| fs::read_to_string(path).ok()).unwrap_or_default();
-                of_table(&text, error, time, scale)
+                of_table(&text, *error, *time, *scale)
             }
-            Source::Case { case, curves } => outcomes
+            Source::Case { name, curves } => outcomes
                 .iter()
-                .find(|outcome| outcome.case == case)
+                .find(|outcome| outcome.case == *name)
                 .map_or_else(Vec::new, |outcome| of_curves(outcome, curves)),
         };
         let mut points: Vec<Point> = points
             .into_iter()
             .filter(|(_, time, error)| time.is_finite() && error.is_finite() && *time > 0.0)
             .map(|(name, time, error)| {
-                let method = name.split(self.split).next().unwrap_or(&name).to_owned();
+                let method = name.split(&self.split).next().unwrap_or(&name).to_owned();
                 let default = method == self.default;
                 let shown = [time, error].map(|number| format!("{number:.2e}"));
                 Point { method, name, time, error, front: false, default, shown }
@@ -415,7 +182,7 @@ impl Subject {
         // an error of 0 has no place on a logarithmic axis
         let y = |point: &Point| point.error.max(1e-17);
         let mut plot =
-            LinePlot::new(self.title).axes(self.axes[0], self.axes[1]).log_x().log_y().size(900.0, 520.0);
+            LinePlot::new(&self.title).axes(&self.axes[0], &self.axes[1]).log_x().log_y().size(900.0, 520.0);
         let mut methods: BTreeMap<&str, Vec<&Point>> = BTreeMap::new();
         for point in points {
             methods.entry(&point.method).or_default().push(point);

@@ -13,7 +13,7 @@ use polycore::file::atomic_write;
 use serde::{Deserialize, Serialize};
 
 use super::Case;
-use super::outcome::Outcome;
+use crate::outcome::Outcome;
 
 /// How cases are run.
 pub struct Settings {

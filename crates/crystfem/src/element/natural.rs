@@ -4,7 +4,7 @@
 //! along its third axis; r, s, t ≥ 0, r + s + t ≤ 1 in a tetrahedron.
 
 use super::{CORNERS, WIDE, WIDE_POINTS};
-use crate::mesh::Shape;
+use crate::shape::Shape;
 use std::sync::OnceLock;
 
 /// N and ∂N/∂ξ of each node.

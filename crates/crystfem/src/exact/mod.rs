@@ -5,6 +5,7 @@
 
 mod benchmark;
 mod cooling;
+pub mod cube;
 mod front;
 mod half_space;
 mod manufactured;
@@ -37,16 +38,9 @@ pub fn erfcx(x: f64) -> f64 {
 }
 
 /// Where a function that is positive at `low` and negative at `high` changes sign, to the last bit.
-fn root(mut low: f64, mut high: f64, f: impl Fn(f64) -> f64) -> f64 {
+fn root(low: f64, high: f64, f: impl Fn(f64) -> f64) -> f64 {
     // a number has 64 bits; halving from 1e308 to 1e-308 takes 2100 steps
-    for _ in 0..2200 {
-        let middle = 0.5 * (low + high);
-        if middle == low || middle == high || middle.is_nan() {
-            break;
-        }
-        if f(middle) > 0.0 { low = middle } else { high = middle }
-    }
-    0.5 * (low + high)
+    polycore::numerics::bisected(low, high, 2200, |x| f(x) > 0.0)
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! Levenberg–Marquardt from several starts, and the covariance at the minimum.
 
 use crate::error::Error;
-use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
-use nalgebra::{DMatrix, DVector, Dyn, Owned};
+use nalgebra::{DMatrix, DVector};
+use polycore::numerics::least_squares::{Found, levenberg_marquardt};
 use polycore::posterior;
 use std::cell::Cell;
 
@@ -66,14 +66,17 @@ pub fn minimize(
     let refuse = |reason: &str| Error::Data { what: what.to_owned(), reason: reason.to_owned() };
     let mut best: Option<(f64, DVector<f64>)> = None;
     let evaluations = Cell::new(0);
+    let trial = |at: &DVector<f64>| {
+        evaluations.set(evaluations.get() + 1);
+        // a trial outside the domain must be rejected; `None` would end the search
+        Some(DVector::from_vec(residuals(at.as_slice()).unwrap_or_else(|| vec![REJECTED; count])))
+    };
     for start in starts {
         let at = DVector::from_row_slice(start);
-        let problem = Problem { residuals, count, at, step, evaluations: &evaluations };
-        let (problem, report) = LevenbergMarquardt::new().with_patience(200).minimize(problem);
-        let objective = report.objective_function;
+        let Found { at, objective } = levenberg_marquardt(at, 200, trial, |at| jacobian(residuals, at, step));
         let better = best.as_ref().is_none_or(|(least, _)| objective < *least);
-        if objective < REJECTED && better && residuals(problem.at.as_slice()).is_some() {
-            best = Some((objective, problem.at));
+        if objective < REJECTED && better && residuals(at.as_slice()).is_some() {
+            best = Some((objective, at));
         }
     }
     let undetermined =
@@ -115,37 +118,4 @@ fn jacobian(residuals: &Residuals, at: &DVector<f64>, step: f64) -> Option<DMatr
         ));
     }
     Some(DMatrix::from_columns(&columns))
-}
-
-struct Problem<'a> {
-    residuals: &'a Residuals<'a>,
-    count: usize,
-    at: DVector<f64>,
-    step: f64,
-    evaluations: &'a Cell<usize>,
-}
-
-impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
-    type ResidualStorage = Owned<f64, Dyn>;
-    type JacobianStorage = Owned<f64, Dyn, Dyn>;
-    type ParameterStorage = Owned<f64, Dyn>;
-
-    fn set_params(&mut self, at: &DVector<f64>) {
-        self.at.copy_from(at);
-    }
-
-    fn params(&self) -> DVector<f64> {
-        self.at.clone()
-    }
-
-    fn residuals(&self) -> Option<DVector<f64>> {
-        self.evaluations.set(self.evaluations.get() + 1);
-        // a trial outside the domain must be rejected; `None` would end the search
-        let rejected = || vec![REJECTED; self.count];
-        Some(DVector::from_vec((self.residuals)(self.at.as_slice()).unwrap_or_else(rejected)))
-    }
-
-    fn jacobian(&self) -> Option<DMatrix<f64>> {
-        jacobian(self.residuals, &self.at, self.step)
-    }
 }

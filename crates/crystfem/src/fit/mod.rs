@@ -7,6 +7,7 @@ mod nakamura;
 mod ozawa;
 mod part;
 mod student;
+mod thermogram;
 
 pub use avrami::avrami;
 pub use heat_flow::{Baseline, Peak, at};
@@ -14,6 +15,7 @@ pub use nakamura::{Known, Run, nakamura};
 pub use ozawa::{Cooling, ozawa, rates_at};
 pub use part::part;
 pub use student::quantile;
+pub use thermogram::{MeasuredPeak, Thermogram};
 
 use crate::error::Error;
 

@@ -1,5 +1,7 @@
 //! Student's distribution.
 
+use polycore::numerics::bisected;
+
 /// t with P(|x| ≤ t) = 0.95 for Student's distribution of so many degrees of freedom (at least 1); Abramowitz &
 /// Stegun 26.7.3 and 26.7.4, inverted by bisection.
 pub fn quantile(degrees: usize) -> f64 {
@@ -9,12 +11,7 @@ pub fn quantile(degrees: usize) -> f64 {
         let second = (5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z) / (96.0 * n * n);
         return z + (z.powi(3) + z) / (4.0 * n) + second;
     }
-    let (mut low, mut high) = (0.0, 13.0);
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if within(middle, degrees.max(1)) < 0.95 { low = middle } else { high = middle }
-    }
-    0.5 * (low + high)
+    bisected(0.0, 13.0, 60, |t| within(t, degrees.max(1)) < 0.95)
 }
 
 /// P(|x| ≤ t).

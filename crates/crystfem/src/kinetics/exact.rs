@@ -1,6 +1,7 @@
 //! Exact solutions of the kinetics: isothermal (Avrami) and at a constant cooling rate.
 
 use super::Kinetics;
+use polycore::numerics::bisected;
 
 /// α = 1 − exp(−ln 2 (t/t_½)ⁿ), Eqs (4.2) and (4.6).
 pub fn avrami(time: f64, half_time: f64, exponent: f64) -> f64 {
@@ -77,7 +78,7 @@ impl CoolingCurve {
             return None;
         }
         let index = self.z.partition_point(|&x| x < z).max(1);
-        Some(bisect(self.temperature[index], self.temperature[index - 1], |t| self.z_at(t) >= z))
+        Some(bisected(self.temperature[index], self.temperature[index - 1], 80, |t| self.z_at(t) >= z))
     }
 
     /// The temperature at which dα/dt is greatest, K.
@@ -95,13 +96,4 @@ impl CoolingCurve {
         }
         0.5 * (low + high)
     }
-}
-
-/// The place in \[low, high\] below which `reached` holds.
-fn bisect(mut low: f64, mut high: f64, reached: impl Fn(f64) -> bool) -> f64 {
-    for _ in 0..80 {
-        let middle = 0.5 * (low + high);
-        if reached(middle) { low = middle } else { high = middle }
-    }
-    0.5 * (low + high)
 }

@@ -1,7 +1,7 @@
 //! The increment Δz = ∫K(T(t)) dt of a temperature that runs linearly in time, with its derivative.
 
 use super::{Constants, Kinetics, LARGEST_Z};
-use crate::elementary::exp;
+use crate::simd_math::exp;
 
 /// Panels into which (T∞, T₀) is divided; an increment is integrated panel by panel. The error in α of one panel
 /// of PA12 (5.4 K) is about 1e-5 at worst, and of steps of 1 K 3e-8.

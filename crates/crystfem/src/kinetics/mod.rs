@@ -13,6 +13,7 @@ pub use growth::{Growth, PANELS, Panels};
 pub use scheme::Scheme;
 
 use crate::error::Error;
+use polycore::numerics::bisected;
 
 /// Universal gas constant R as the thesis rounds it, J/(mol K).
 pub const GAS_CONSTANT: f64 = 8.314;
@@ -163,16 +164,9 @@ impl Kinetics {
 
     /// Where crystallization is fastest: T in K and K(T) in 1/s.
     pub fn fastest(&self) -> [f64; 2] {
-        let (mut low, mut high) = (self.constants.frozen, self.constants.equilibrium_melting);
+        let (low, high) = (self.constants.frozen, self.constants.equilibrium_melting);
         // K grows without bound in proportion at T∞ and falls so at T₀
-        for _ in 0..200 {
-            let middle = 0.5 * (low + high);
-            if middle <= low || middle >= high {
-                break;
-            }
-            if self.logarithmic_slope(middle) > 0.0 { low = middle } else { high = middle }
-        }
-        let temperature = 0.5 * (low + high);
+        let temperature = bisected(low, high, 200, |t| self.logarithmic_slope(t) > 0.0);
         [temperature, self.rate(temperature)]
     }
 

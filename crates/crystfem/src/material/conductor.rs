@@ -52,7 +52,7 @@ impl Conductor {
         conductivity.jumps().then(|| [conductivity.integral(temperature), conductivity.at(temperature)])
     }
 
-    /// Whether both properties are constant.
+    /// Returns whether both properties are constant.
     pub(super) fn is_constant(&self) -> bool {
         self.conductivity.is_constant() && self.specific_heat.is_constant()
     }

@@ -2,6 +2,7 @@
 
 use super::{Crystallization, Point, Response, ThermalMaterial};
 use crate::error::Error;
+use std::collections::HashMap;
 use std::sync::Arc;
 
 /// A material of which an element holds only a part, spread evenly over it: ρ and k are that part of the material's, and
@@ -25,6 +26,39 @@ impl Filled {
         }
         Err(Error::Parameter { name: "filled part", found: fill, allowed: "above 0, finite".into() })
     }
+}
+
+/// Replaces materials by [`Filled`] ones, one for each material and filled part that elements have: `part_of` is the index
+/// of each element among `parts`.
+///
+/// # Errors
+/// Those of [`Filled::new`]; more than 65536 of them.
+pub fn fill_elements(
+    materials: &mut Vec<Arc<dyn ThermalMaterial>>,
+    material_of: &mut [u16],
+    parts: &[f64],
+    part_of: &[usize],
+) -> Result<(), Error> {
+    let mut all: Vec<Arc<dyn ThermalMaterial>> = Vec::new();
+    let mut known: HashMap<(u16, usize), u16> = HashMap::new();
+    for (material, &part) in material_of.iter_mut().zip(part_of) {
+        let key = (*material, part);
+        *material = match known.get(&key) {
+            Some(&found) => found,
+            None => {
+                let number = u16::try_from(all.len()).map_err(|_| Error::Parameter {
+                    name: "filled parts of all materials",
+                    found: all.len() as f64,
+                    allowed: "at most 65536".into(),
+                })?;
+                all.push(Arc::new(Filled::new(materials[usize::from(key.0)].clone(), parts[part])?));
+                known.insert(key, number);
+                number
+            }
+        };
+    }
+    *materials = all;
+    Ok(())
 }
 
 impl ThermalMaterial for Filled {

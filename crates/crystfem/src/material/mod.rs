@@ -13,7 +13,7 @@ mod semicrystalline;
 pub use as_published::{AsPublished, Sign};
 pub use conductor::Conductor;
 pub use crystallization::{Crystallization, Grown};
-pub use filled::Filled;
+pub use filled::{Filled, fill_elements};
 pub use powder::Powder;
 pub use property::{Property, REFERENCE_TEMPERATURE, Table};
 pub(crate) use rows::{Increments, Scratch};

@@ -55,7 +55,7 @@ impl<M: ThermalMaterial> Powder<M> {
     }
 
     /// How many states the solid has.
-    fn own(&self) -> usize {
+    fn solid_states(&self) -> usize {
         self.of.state_names().len()
     }
 }
@@ -66,32 +66,32 @@ impl<M: ThermalMaterial> ThermalMaterial for Powder<M> {
     }
 
     fn state_names(&self) -> &'static [&'static str] {
-        if self.own() == 0 { ALONE } else { STATES }
+        if self.solid_states() == 0 { ALONE } else { STATES }
     }
 
     fn initial_state(&self, temperature: f64, state: &mut [f64]) {
-        let (own, last) = state.split_at_mut(self.own());
+        let (own, last) = state.split_at_mut(self.solid_states());
         self.of.initial_state(temperature, own);
         last[0] = self.consolidated(temperature, 0.0)[0];
     }
 
     fn field_names(&self) -> &'static [&'static str] {
-        if self.own() == 0 { ALONE } else { FIELDS }
+        if self.solid_states() == 0 { ALONE } else { FIELDS }
     }
 
     fn fields(&self, state: &[f64], fields: &mut [f64]) {
-        let (own, last) = state.split_at(self.own());
+        let (own, last) = state.split_at(self.solid_states());
         let count = fields.len() - 1;
         self.of.fields(own, &mut fields[..count]);
         fields[count] = last[0];
     }
 
     fn crystallization_rate(&self, temperature: f64, state: &[f64]) -> f64 {
-        self.of.crystallization_rate(temperature, &state[..self.own()])
+        self.of.crystallization_rate(temperature, &state[..self.solid_states()])
     }
 
     fn energy(&self, temperature: f64, state: &[f64]) -> f64 {
-        self.of.energy(temperature, &state[..self.own()])
+        self.of.energy(temperature, &state[..self.solid_states()])
     }
 
     fn is_linear(&self) -> bool {
@@ -103,7 +103,7 @@ impl<M: ThermalMaterial> ThermalMaterial for Powder<M> {
     }
 
     fn respond(&self, at: &Point, old: &[f64], new: &mut [f64]) -> Result<Response, Error> {
-        let own = self.own();
+        let own = self.solid_states();
         let response = self.of.respond(at, &old[..own], &mut new[..own])?;
         let [part, slope] = self.consolidated(at.temperature + at.increment, old[own]);
         new[own] = part;

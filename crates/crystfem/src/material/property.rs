@@ -100,12 +100,12 @@ impl Property {
         }
     }
 
-    /// Whether it changes by more than a tenth of itself within 1 K somewhere.
+    /// Returns whether it changes by more than a tenth of itself within 1 K somewhere.
     pub fn jumps(&self) -> bool {
         matches!(self, Self::Table(table) if table.jumps)
     }
 
-    /// Whether it is the same everywhere.
+    /// Returns whether it is the same everywhere.
     pub fn is_constant(&self) -> bool {
         match self {
             Self::Constant(_) => true,

@@ -7,8 +7,8 @@
 use super::Crystallization;
 use super::crystallization::{FAINT, Grown, HEATING_PANELS, NOTHING};
 use super::semicrystalline::{LARGEST_CHANGE, LONGEST};
-use crate::elementary::{SMALL, exp, expm1_small, ln, ln_1p};
 use crate::kinetics::{PANELS, Panels};
+use crate::simd_math::{SMALL, exp, expm1_small, ln, ln_1p};
 use pulp::{Arch, Simd, WithSimd};
 
 /// z at least for powers of it; zⁿ at most for its exponential, and the logarithm of that.
@@ -101,7 +101,7 @@ impl Crystallization {
         for &(point, before) in &*long {
             seen.see(self, before, z[point as usize]);
         }
-        seen.wish(self)
+        seen.requested_ratio(self)
     }
 
     /// Growth and fall of all nodes and pieces.
@@ -214,7 +214,7 @@ impl Seen {
         }
     }
 
-    fn wish(&mut self, law: &Crystallization) -> Option<f64> {
+    fn requested_ratio(&mut self, law: &Crystallization) -> Option<f64> {
         let Self { before, after, small } = self;
         let exponent = law.kinetics.constants().avrami_exponent;
         Arch::new().dispatch(Changes { exponent, before, after });

@@ -4,7 +4,7 @@ use super::branch::Energies;
 use super::element::{POINTS, Six};
 use super::kind::{self, Element};
 use super::maxwell::Increment;
-use super::solve::{Load, gather};
+use super::product::{Load, gather};
 use crate::error::Error;
 use crate::mesh::Mesh;
 use nalgebra::Vector3;
@@ -23,11 +23,11 @@ pub struct Body<'a> {
     shape: Vec<u32>,
     /// Residual over the load at which a solution ends.
     pub tolerance: f64,
-    /// What changes.
+    /// State.
     pub state: BodyState,
 }
 
-/// What a body needs to continue, bit by bit.
+/// State of a body, to continue bit by bit.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct BodyState {
     /// Elastic strains of the branches at each Gauss point (0 beyond those of the element), element by element; empty before birth.
@@ -41,15 +41,15 @@ pub struct BodyState {
     /// Rotation of each element since it was melt, rad: half the curl of the displacement in its middle.
     rotations: Vec<[f64; 3]>,
     /// Energies of all steps so far.
-    pub audit: Audit,
+    pub balance: EnergyBalance,
 }
 
 /// Energies of the steps of a body, J.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Audit {
+pub struct EnergyBalance {
     /// Of all branches of all elements.
     pub energies: Energies,
-    /// What the melt's floor took, which forgets it.
+    /// Energy dissipated by the minimum stiffness of the melt.
     pub floor: f64,
     /// Largest |[`Energies::closure`]| of a step over the energies that it moved and those stored.
     pub worst: f64,
@@ -101,7 +101,7 @@ impl<'a> Body<'a> {
                 displacement: vec![[0.0; 3]; mesh.points.len()],
                 iterations: 0,
                 rotations: vec![[0.0; 3]; count],
-                audit: Audit::default(),
+                balance: EnergyBalance::default(),
             },
         })
     }
@@ -220,12 +220,12 @@ impl<'a> Body<'a> {
                 turned.iter_mut().zip(shape.rotation(&local)).for_each(|(sum, more)| *sum += more);
             }
         }
-        let audit = &mut self.state.audit;
-        audit.energies.add(&energies, 1.0);
-        audit.floor += floor;
-        let moved_energy = energies.size() + audit.energies.stored.abs();
+        let balance = &mut self.state.balance;
+        balance.energies.add(&energies, 1.0);
+        balance.floor += floor;
+        let moved_energy = energies.size() + balance.energies.stored.abs();
         if moved_energy > 0.0 {
-            audit.worst = audit.worst.max(energies.closure().abs() / moved_energy);
+            balance.worst = balance.worst.max(energies.closure().abs() / moved_energy);
         }
         for (place, moved) in self.state.displacement.iter_mut().zip(&moved) {
             (0..3).for_each(|d| place[d] += moved[d]);

@@ -1,29 +1,22 @@
 //! Hexahedra with incompatible modes, of modulus 1: bending without locking, free strains at Gauss points.
 
 use nalgebra::{SMatrix, SVector};
+use polycore::numerics::hexahedron::{self, CORNERS, slopes};
 
 /// Strains and stresses, xx, yy, zz, xy, yz, zx, shear strains as angles.
 pub type Six = SVector<f64, 6>;
+/// Components of the nodes of an element, 0 beyond those that it has.
+pub type Wide = SVector<f64, 30>;
+/// Forces of the modes of a hexahedron.
+pub type Modal = SVector<f64, 9>;
 type Nodal = SVector<f64, 24>;
 
 /// Gauss points.
 pub const POINTS: usize = 8;
 
-/// Signs of the local coordinates of nodes and Gauss points, in Abaqus' and VTK's order.
-const SIGNS: [[f64; 3]; 8] = [
-    [-1.0, -1.0, -1.0],
-    [1.0, -1.0, -1.0],
-    [1.0, 1.0, -1.0],
-    [-1.0, 1.0, -1.0],
-    [-1.0, -1.0, 1.0],
-    [1.0, -1.0, 1.0],
-    [1.0, 1.0, 1.0],
-    [-1.0, 1.0, 1.0],
-];
-
 /// Local coordinates of a Gauss point.
 pub fn gauss(point: usize) -> [f64; 3] {
-    SIGNS[point].map(|sign| sign / 3.0_f64.sqrt())
+    CORNERS[point].map(|sign| sign / 3.0_f64.sqrt())
 }
 
 /// Ĉ: the stiffness of an isotropic body of Young's modulus 1.
@@ -81,7 +74,7 @@ impl Hexahedron {
             }
             let inverse = jacobian.try_inverse()?;
             weights[point] = volume;
-            for (node, local) in derivatives(at).into_iter().enumerate() {
+            for (node, local) in slopes(at).into_iter().enumerate() {
                 let gradient = inverse.transpose() * SVector::<f64, 3>::from(local);
                 nodes[point].fixed_columns_mut::<3>(3 * node).copy_from(&strain_of(gradient.into()));
             }
@@ -104,7 +97,7 @@ impl Hexahedron {
         let inverse = own.try_inverse()?;
         let condensed = full - coupling * inverse * coupling.transpose();
         let middle =
-            derivatives([0.0; 3]).map(|local| centre_inverse.transpose() * SVector::<f64, 3>::from(local));
+            slopes([0.0; 3]).map(|local| centre_inverse.transpose() * SVector::<f64, 3>::from(local));
         Some(Self { weights, nodes, modes, condensed, coupling, inverse, elastic, middle })
     }
 
@@ -152,23 +145,14 @@ impl Hexahedron {
 
     /// Shares of the corners at a Gauss point.
     pub fn shapes(point: usize) -> [f64; 8] {
-        let at = gauss(point);
-        SIGNS.map(|sign| (0..3).map(|d| 0.5 * (1.0 + sign[d] * at[d])).product())
+        hexahedron::shapes(gauss(point))
     }
-}
-
-/// ∂N/∂ξ of the corners.
-fn derivatives(at: [f64; 3]) -> [[f64; 3]; 8] {
-    SIGNS.map(|sign| {
-        let factor = [0, 1, 2].map(|d| 0.5 * (1.0 + sign[d] * at[d]));
-        [0, 1, 2].map(|d| 0.5 * sign[d] * (0..3).filter(|&e| e != d).map(|e| factor[e]).product::<f64>())
-    })
 }
 
 /// ∂x/∂ξ.
 fn jacobian(corners: &[[f64; 3]; 8], at: [f64; 3]) -> SMatrix<f64, 3, 3> {
     let mut jacobian = SMatrix::zeros();
-    for (corner, local) in corners.iter().zip(derivatives(at)) {
+    for (corner, local) in corners.iter().zip(slopes(at)) {
         jacobian += SVector::<f64, 3>::from(*corner) * SVector::<f64, 3>::from(local).transpose();
     }
     jacobian

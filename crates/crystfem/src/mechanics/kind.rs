@@ -1,16 +1,10 @@
 //! Elements of all kinds.
 
-use super::element::{Hexahedron, POINTS, Six};
+use super::element::{Hexahedron, Modal, POINTS, Six, Wide};
 use super::tetrahedron::{self, Tetrahedron};
-use nalgebra::SVector;
 
 /// Nodes of an element at most.
 pub const MOST: usize = 10;
-/// Components of the nodes of an element, 0 beyond those that it has.
-pub type Wide = SVector<f64, 30>;
-/// Forces of the modes of a hexahedron.
-pub type Modal = SVector<f64, 9>;
-
 /// A hexahedron of 8 nodes, or a tetrahedron of 4 or 10.
 #[derive(Clone, Debug)]
 pub enum Element {

@@ -12,7 +12,7 @@ mod product;
 mod solve;
 mod tetrahedron;
 
-pub use body::{Audit, Body, BodyState, Support};
+pub use body::{Body, BodyState, EnergyBalance, Support};
 pub use branch::{Change, Energies, Step};
 pub use eigenstrain::SpecificVolume;
 pub use element::{Hexahedron, POINTS, stiffness};

@@ -1,8 +1,10 @@
 //! Products of element matrices with displacements: each element by vectors of the processor, then the sum at each node in the order of its
 //! elements, so that its bits do not depend on threads.
 
+use super::element::Wide;
 use crate::system::vector::sum;
 use nalgebra::{Matrix3, Vector3};
+use polycore::numerics::Groups;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
@@ -10,6 +12,13 @@ use rayon::prelude::*;
 const ITEM: usize = 512;
 /// Components of an element.
 const COMPONENTS: usize = 24;
+
+/// Forces that add up to a load, node by node.
+pub(super) struct Load {
+    pub(super) sum: Vec<Vector3<f64>>,
+    /// Sum of the squares of the parts.
+    pub(super) parts: f64,
+}
 
 /// Elements of so many nodes: those, K̂ column by column, and its modulus.
 type Stiff<'a, const N: usize> = ([u32; N], &'a [f64], f64);
@@ -19,9 +28,8 @@ pub struct Elements<'a> {
     hexahedra: Vec<Stiff<'a, 8>>,
     first: Vec<Stiff<'a, 4>>,
     second: Vec<Stiff<'a, 10>>,
-    /// Start of the places in `forces` of each node.
-    starts: Vec<u32>,
-    corners: Vec<u32>,
+    /// Places in `forces` of each node.
+    corners: Groups<u32>,
     free: Vec<[bool; 3]>,
     /// Forces on all nodes of all elements.
     forces: Vec<f64>,
@@ -44,19 +52,10 @@ impl<'a> Elements<'a> {
                 first.push((nodes.map(|node| number[node as usize]), stiffness, modulus));
             }
         }
-        let starts = vec![0_u32; free.len() + 1];
-        let mut own =
-            Self { hexahedra, first, second, starts, corners: Vec::new(), free, forces: Vec::new() };
+        let corners = Groups::new(0, std::iter::empty());
+        let mut own = Self { hexahedra, first, second, corners, free, forces: Vec::new() };
         let nodes: Vec<u32> = own.each().flat_map(|element| element.0).copied().collect();
-        nodes.iter().for_each(|&node| own.starts[node as usize + 1] += 1);
-        (0..own.free.len()).for_each(|k| own.starts[k + 1] += own.starts[k]);
-        let mut next = own.starts.clone();
-        own.corners = vec![0; nodes.len()];
-        for (corner, node) in (0..).zip(&nodes) {
-            let next = &mut next[*node as usize];
-            own.corners[*next as usize] = corner;
-            *next += 1;
-        }
+        own.corners = Groups::new(own.free.len(), nodes.iter().map(|&node| node as usize).zip(0..));
         own.forces = vec![0.0; 3 * nodes.len()];
         own
     }
@@ -77,7 +76,7 @@ impl<'a> Elements<'a> {
 
     /// image = Σ E K̂ u on free components.
     pub fn product(&mut self, u: &[Vector3<f64>], image: &mut [Vector3<f64>]) {
-        let Self { hexahedra, first, second, starts, corners, free, forces } = self;
+        let Self { hexahedra, first, second, corners, free, forces } = self;
         let arch = Arch::new();
         let (of_hexahedra, rest) = forces.split_at_mut(COMPONENTS * hexahedra.len());
         let (of_first, of_second) = rest.split_at_mut(12 * first.len());
@@ -91,7 +90,7 @@ impl<'a> Elements<'a> {
         image.par_chunks_mut(ITEM).enumerate().for_each(|(item, image)| {
             for (k, image) in (item * ITEM..).zip(image) {
                 let mut sum = [0.0; 3];
-                for &corner in &corners[starts[k] as usize..starts[k + 1] as usize] {
+                for &corner in corners.of(k) {
                     let force = &forces[3 * corner as usize..][..3];
                     (0..3).for_each(|d| sum[d] += force[d]);
                 }
@@ -166,6 +165,15 @@ impl WithSimd for Product<'_, '_> {
 /// a·b, in work items.
 pub fn dot(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {
     sum(a.len(), |k| a[k].dot(&b[k]))
+}
+
+/// Displacements of an element's nodes.
+pub(super) fn gather(nodes: &[u32], u: &[Vector3<f64>]) -> Wide {
+    let mut local = Wide::zeros();
+    for (k, &node) in nodes.iter().enumerate() {
+        local.fixed_rows_mut::<3>(3 * k).copy_from(&u[node as usize]);
+    }
+    local
 }
 
 #[cfg(test)]

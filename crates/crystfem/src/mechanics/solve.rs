@@ -2,11 +2,11 @@
 
 use super::body::Body;
 use super::coarse::Coarse;
-use super::kind::Wide;
-use super::product::{Elements, block, dot};
+use super::product::{Elements, Load, block, dot};
 use crate::error::Error;
 use crate::system::vector::combine;
 use nalgebra::{Matrix3, Vector3};
+use polycore::numerics::conjugate_gradients;
 
 const NONE: u32 = u32::MAX;
 
@@ -15,13 +15,6 @@ const ITERATIONS: usize = 20;
 
 /// A load below this part of the forces that add up to it is their rounding.
 const ROUNDING: f64 = 1e-14;
-
-/// Forces that add up to a load, node by node.
-pub(super) struct Load {
-    pub(super) sum: Vec<Vector3<f64>>,
-    /// Sum of the squares of the parts.
-    pub(super) parts: f64,
-}
 
 impl Body<'_> {
     /// Conjugate gradients with the inverse 3 × 3 blocks of the nodes and a coarse level of rigid motions, on the nodes that exist; adds
@@ -70,46 +63,25 @@ impl Body<'_> {
             (0..3).filter(|&d| !free[d]).for_each(|d| value[d] = 0.0);
         }
         let goal = (self.tolerance * dot(&residual, &residual).sqrt()).max(ROUNDING * load.parts.sqrt());
-        let spread = |moved: &[Vector3<f64>]| {
-            let mut all = vec![Vector3::zeros(); number.len()];
-            nodes.iter().zip(moved).for_each(|(&node, &moved)| all[node] = moved);
-            all
-        };
-        let mut moved = vec![Vector3::zeros(); residual.len()];
         if dot(&residual, &residual).sqrt() <= goal {
-            return Ok(spread(&moved));
+            return Ok(vec![Vector3::zeros(); number.len()]);
         }
         let coarse = Coarse::new(&elements, &points);
         let precondition = |residual: &[Vector3<f64>], result: &mut [Vector3<f64>]| {
             combine(result, |k, _| blocks[k] * residual[k]);
             coarse.add(residual, result);
         };
-        let mut conditioned = vec![Vector3::zeros(); residual.len()];
-        precondition(&residual, &mut conditioned);
-        let mut direction = conditioned.clone();
-        let mut image = vec![Vector3::zeros(); residual.len()];
-        let mut product = dot(&residual, &direction);
-        let mut iterations = 0;
-        let mut found = f64::INFINITY;
-        for _ in 0..(ITERATIONS * 3 * residual.len()).max(100) {
-            iterations += 1;
-            elements.product(&direction, &mut image);
-            let length = product / dot(&direction, &image);
-            combine(&mut moved, |k, moved| moved + direction[k] * length);
-            combine(&mut residual, |k, residual| residual - image[k] * length);
-            found = dot(&residual, &residual).sqrt();
-            if found <= goal {
-                break;
-            }
-            precondition(&residual, &mut conditioned);
-            let next = dot(&residual, &conditioned);
-            combine(&mut direction, |k, direction| conditioned[k] + direction * (next / product));
-            product = next;
-        }
-        let moved = spread(&moved);
-        self.state.iterations += iterations;
+        let most = (ITERATIONS * 3 * residual.len()).max(100);
+        let reached = |residual: &[Vector3<f64>]| dot(residual, residual).sqrt() <= goal;
+        let product = |u: &[Vector3<f64>], image: &mut [Vector3<f64>]| elements.product(u, image);
+        let (moved, iterations) =
+            conjugate_gradients(&mut residual, most, reached, product, precondition, dot);
+        self.state.iterations += iterations as u64;
+        let found = dot(&residual, &residual).sqrt();
         if found <= goal {
-            return Ok(moved);
+            let mut all = vec![Vector3::zeros(); number.len()];
+            nodes.iter().zip(&moved).for_each(|(&node, &moved)| all[node] = moved);
+            return Ok(all);
         }
         Err(Error::Parameter {
             name: "residual of the stresses",
@@ -117,12 +89,4 @@ impl Body<'_> {
             allowed: format!("at most {goal:e}: are all rigid motions held?"),
         })
     }
-}
-
-pub(super) fn gather(nodes: &[u32], u: &[Vector3<f64>]) -> Wide {
-    let mut local = Wide::zeros();
-    for (k, &node) in nodes.iter().enumerate() {
-        local.fixed_rows_mut::<3>(3 * k).copy_from(&u[node as usize]);
-    }
-    local
 }

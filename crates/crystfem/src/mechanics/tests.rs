@@ -198,7 +198,7 @@ fn a_release_does_the_work_of_its_reactions() {
         }
     }
     body.step(|_| hold(1e9), |_, _, _| 0.0, &resting(&mesh)).unwrap();
-    let work = body.state.audit.energies.work - before.audit.energies.work;
+    let work = body.state.balance.energies.work - before.balance.energies.work;
     let moved = body.state.displacement.iter().zip(&before.displacement);
     let by_reactions: f64 = moved
         .zip(&reaction)
@@ -206,7 +206,7 @@ fn a_release_does_the_work_of_its_reactions() {
         .sum();
     near("stress_release_work", work / by_reactions, 1.0, 1e-9);
     assert!(work < 0.0);
-    at_most("stress_release_closure", body.state.audit.worst, 1e-13);
+    at_most("stress_release_closure", body.state.balance.worst, 1e-13);
     // both ends rest: the middles of the last elements are 31 mm from the middle of the arc
     let turned = body.largest_rotation();
     near("stress_release_rotation", turned / (curvature(&mesh, &body).abs() * 0.031), 1.0, 2e-3);

@@ -1,7 +1,6 @@
 //! Tetrahedra of first and second order, of modulus 1.
 
-use super::element::{POINTS, Six, stiffness, strain_of};
-use super::kind::Wide;
+use super::element::{POINTS, Six, Wide, stiffness, strain_of};
 use crate::element::natural::Natural;
 use crate::mesh::Shape;
 use nalgebra::{Matrix3, SMatrix, Vector3};

@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::error::Error;
+use crate::file::line_error;
 use crate::mesh::Shape;
-use crate::mesh::labelled::{Content, Element, Kind, Node, ReadMesh, line_error};
+use crate::mesh::file_mesh::{Content, Element, Kind, Node, ReadMesh};
 
 mod cards;
 mod ignored;
@@ -16,7 +17,7 @@ mod write;
 use cards::{Card, Cards};
 use ignored::Ignored;
 use place::Place;
-use sets::{Entry, Of, Resolver, Set};
+use sets::{Entry, Resolver, Set, SetKind};
 pub use write::write;
 
 /// Reads a mesh, coordinates multiplied by `scale` (1e-3 for a file in mm).
@@ -33,7 +34,7 @@ pub use write::write;
 /// fit, sets and nodes that do not exist, and what would change the mesh unseen (`*NGEN`, `*SYSTEM`, …);
 /// [`Error::Mesh`] from [`crate::mesh::quality::check`]. Memory follows the size of the file.
 pub fn read(path: &Path, scale: f64) -> Result<ReadMesh, Error> {
-    let bytes = super::read_bytes(path)?;
+    let bytes = crate::file::read_bytes(path)?;
     parse(path, &bytes, scale)
 }
 
@@ -54,8 +55,8 @@ fn mesh(path: &Path, cards: &mut Cards, scale: f64) -> Result<ReadMesh, Error> {
         match card.keyword.as_str() {
             "NODE" => reader.nodes(&card, cards)?,
             "ELEMENT" => reader.elements(&card, cards)?,
-            "NSET" => reader.set(card, Of::Nodes, "NSET", cards)?,
-            "ELSET" => reader.set(card, Of::Elements, "ELSET", cards)?,
+            "NSET" => reader.set(card, SetKind::Nodes, "NSET", cards)?,
+            "ELSET" => reader.set(card, SetKind::Elements, "ELSET", cards)?,
             "SURFACE" => reader.surface(card, cards)?,
             "PART" => reader.once(&card)?,
             "INSTANCE" => {
@@ -154,7 +155,7 @@ impl Reader<'_> {
         if let Some(name) = card.parameter("NSET") {
             let labels = self.content.nodes[first..].iter();
             let entries = labels.map(|node| (node.line as usize, Entry::Label(node.label))).collect();
-            self.sets.push(Set { name: name.to_owned(), of: Of::Nodes, entries });
+            self.sets.push(Set { name: name.to_owned(), of: SetKind::Nodes, entries });
         }
         Ok(())
     }
@@ -203,20 +204,20 @@ impl Reader<'_> {
             let labels = self.content.elements[first..].iter();
             let entries =
                 labels.map(|element| (element.line as usize, Entry::Label(element.label))).collect();
-            self.sets.push(Set { name: name.to_owned(), of: Of::Elements, entries });
+            self.sets.push(Set { name: name.to_owned(), of: SetKind::Elements, entries });
         }
         Ok(())
     }
 
-    fn set(&mut self, card: Card, of: Of, key: &'static str, cards: &mut Cards) -> Result<(), Error> {
+    fn set(&mut self, card: Card, of: SetKind, key: &'static str, cards: &mut Cards) -> Result<(), Error> {
         let Some(name) = card.parameter(key) else {
             let allowed = format!("*{key}, {key}=NAME");
             return Err(line_error(self.path, card.line, "name of a set", "", allowed));
         };
         let mut entries = Vec::new();
         let mut of = of;
-        if let (Of::Nodes, Some(elements)) = (of, card.parameter("ELSET")) {
-            of = Of::NodesOfElements;
+        if let (SetKind::Nodes, Some(elements)) = (of, card.parameter("ELSET")) {
+            of = SetKind::NodesOfElements;
             entries.push((card.line, Entry::Set(elements.to_owned())));
         }
         let generate = card.parameter("GENERATE").is_some();
@@ -235,7 +236,7 @@ impl Reader<'_> {
                 }
                 entries.push((row.line, Entry::Range(range)));
             } else {
-                entries.extend(words.iter().map(|word| (row.line, Entry::of(word))));
+                entries.extend(words.iter().map(|word| (row.line, Entry::parse(word))));
             }
         }
         self.sets.push(Set { name: name.to_owned(), of, entries });
@@ -258,7 +259,7 @@ impl Reader<'_> {
             let Some(first) = words.first() else { continue };
             if nodes {
                 // the second column is an area
-                entries.push((row.line, Entry::of(first)));
+                entries.push((row.line, Entry::parse(first)));
                 continue;
             }
             let side = words.get(1).map_or("", |word| *word).to_uppercase();
@@ -273,9 +274,9 @@ impl Reader<'_> {
                     ));
                 }
             };
-            entries.push((row.line, Entry::Side(Box::new(Entry::of(first)), side)));
+            entries.push((row.line, Entry::Side(Box::new(Entry::parse(first)), side)));
         }
-        let of = if nodes { Of::Nodes } else { Of::Faces };
+        let of = if nodes { SetKind::Nodes } else { SetKind::Faces };
         self.sets.push(Set { name: name.to_owned(), of, entries });
         Ok(())
     }

@@ -9,7 +9,7 @@ use std::path::Path;
 
 use crate::error::Error;
 use crate::mesh::Shape;
-use crate::mesh::labelled::{Content, Element, Kind, Labels, Node, ReadMesh};
+use crate::mesh::file_mesh::{Content, Element, Kind, Labels, Node, ReadMesh};
 
 mod numbers;
 mod two;
@@ -26,7 +26,7 @@ use numbers::{Numbers, Version};
 /// and the byte) for what is not MSH 2 or 4, other elements, and numbers that do not fit; [`Error::Mesh`] from
 /// [`crate::mesh::quality::check`]. Memory follows the size of the file, not the counts that it announces.
 pub fn read(path: &Path, scale: f64) -> Result<ReadMesh, Error> {
-    let bytes = super::read_bytes(path)?;
+    let bytes = crate::file::read_bytes(path)?;
     parse(path, &bytes, scale)
 }
 

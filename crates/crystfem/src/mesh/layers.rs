@@ -1,7 +1,8 @@
-//! Which layer an element belongs to, and when it appears.
+//! Layers of elements, and groups that appear together.
 
 use crate::error::Error;
 use crate::mesh::Mesh;
+use polycore::numerics::range;
 
 /// Elements by layers, in the order of printing.
 #[derive(Clone, Debug, PartialEq)]
@@ -129,8 +130,7 @@ impl Layers {
     pub fn from_height(mesh: &Mesh, elements: &[u32], height: f64) -> Result<Self, Error> {
         let nodes = elements.iter().flat_map(|element| mesh.nodes(*element));
         let heights = nodes.map(|node| mesh.points[*node as usize][2]);
-        let (low, high) =
-            heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z| (low.min(z), high.max(z)));
+        let [low, high] = range(heights);
         // a last layer of less than a millionth is rounding
         let count = ((high - low) / height - 1e-6).ceil();
         if !(height > 0.0 && count >= 1.0 && count <= elements.len() as f64) {
@@ -140,18 +140,6 @@ impl Layers {
         let mut faces: Vec<f64> = (0..count as usize).map(|layer| low + layer as f64 * height).collect();
         faces.push(high);
         Self::from_heights(mesh, elements, &faces)
-    }
-
-    /// Time at which each element of the mesh appears, s: of layer k (from 0) `first` + k · `interval`; elements in no
-    /// layer exist from the start, at −∞.
-    pub fn activation(&self, mesh: &Mesh, first: f64, interval: f64) -> Vec<f64> {
-        let mut times = vec![f64::NEG_INFINITY; mesh.element_count()];
-        for (layer, elements) in self.elements.iter().enumerate() {
-            for element in elements {
-                times[*element as usize] = first + layer as f64 * interval;
-            }
-        }
-        times
     }
 }
 
@@ -216,12 +204,6 @@ mod tests {
         let printed = &mesh.element_sets["bar"];
         assert_eq!(Layers::from_height(&mesh, printed, 2e-4).unwrap(), named);
         assert_eq!(Layers::from_heights(&mesh, printed, &[0.0, 2e-4, 4e-4, 6e-4]).unwrap(), named);
-        let times = named.activation(&mesh, 5.0, 10.0);
-        assert_eq!(times[named.elements[2][0] as usize], 25.0);
-        assert_eq!(times[mesh.element_sets["substrate"][0] as usize], f64::NEG_INFINITY);
-        let groups = groups(&times, 0.0).unwrap();
-        let expected: Vec<(f64, Vec<u32>)> = [5.0, 15.0, 25.0].into_iter().zip(named.elements).collect();
-        assert_eq!(groups, expected);
     }
 
     #[test]

@@ -1,10 +1,11 @@
-//! Where a place lies in a mesh, for values between nodes.
+//! Location of places in a mesh, for values between nodes.
 
 use super::Mesh;
+use crate::element::WIDE;
 use crate::element::natural::{self, Natural};
-use crate::element::{self, CORNERS, WIDE};
 use crate::mesh::Shape;
 use nalgebra::{Matrix3, Vector3};
+use polycore::numerics::hexahedron;
 
 /// Natural coordinates, and distances over an element's diagonal, that count as none: a place on a node has its value.
 const NEAR: f64 = 1e-9;
@@ -22,7 +23,7 @@ pub struct Place {
     weights: Vec<(u32, f64)>,
     /// Elements that hold it: one, or those that meet there.
     elements: Vec<u32>,
-    /// How far it is from the place that was requested, m; 0 inside the mesh.
+    /// Distance from the requested place, m; 0 inside the mesh.
     distance: f64,
 }
 
@@ -32,7 +33,7 @@ impl Place {
         &self.elements
     }
 
-    /// How far it is from the place that was requested, m; 0 inside the mesh.
+    /// Distance from the requested place, m; 0 inside the mesh.
     pub fn distance(&self) -> f64 {
         self.distance
     }
@@ -49,14 +50,14 @@ impl Place {
 }
 
 impl Mesh {
-    /// Whether a place, m, lies in an element or on its faces.
+    /// Returns whether a place, m, lies in an element or on its faces.
     pub fn holds(&self, element: u32, at: [f64; 3]) -> bool {
         self.shapes_at(element, at).is_some()
     }
 
     /// Shape functions of an element's nodes at a place, m, in it or on its faces; `None` outside.
     pub fn shapes_at(&self, element: u32, at: [f64; 3]) -> Option<[f64; WIDE]> {
-        let (corners, nodes) = element::positions::<WIDE>(self, element);
+        let (corners, nodes) = self.positions::<WIDE>(element);
         let (weights, distance, rounding) = near(corners.get(..nodes).filter(|list| !list.is_empty())?, at)?;
         (distance <= rounding).then_some(weights)
     }
@@ -109,7 +110,7 @@ impl Mesh {
     fn locate_in(&self, elements: impl Iterator<Item = u32>, at: [f64; 3]) -> Option<Place> {
         let mut found: Vec<(u32, [f64; WIDE], f64, f64)> = Vec::new();
         for number in elements {
-            let (corners, nodes) = element::positions::<WIDE>(self, number);
+            let (corners, nodes) = self.positions::<WIDE>(number);
             let corners = &corners[..nodes];
             if let Some((weights, distance, rounding)) = near(corners, at) {
                 found.push((number, weights, distance, rounding));
@@ -160,9 +161,7 @@ fn of_hexahedron(natural: Vector3<f64>) -> [f64; WIDE] {
     // exact at the ends: a node has the weight 1, and those across a face have 0
     let natural = natural.map(|x| if x.abs() > 1.0 - NEAR { x.signum() } else { x });
     let mut weights = [0.0; WIDE];
-    for (weight, corner) in weights.iter_mut().zip(CORNERS) {
-        *weight = (0..3).map(|d| 0.5 * (1.0 + natural[d] * corner[d])).product();
-    }
+    weights[..8].copy_from_slice(&hexahedron::shapes(natural.into()));
     weights
 }
 
@@ -214,15 +213,10 @@ fn in_hexahedron(corners: &[[f64; 3]], at: [f64; 3]) -> [f64; WIDE] {
     let mut natural = Vector3::<f64>::zeros();
     for _ in 0..MOST_ITERATIONS {
         let (mut left, mut jacobian) = (offset(at), Matrix3::<f64>::zeros());
-        for (corner, signs) in corners.iter().zip(&CORNERS) {
-            let factor = [0, 1, 2].map(|d| 0.5 * (1.0 + natural[d] * signs[d]));
-            left -= factor.iter().product::<f64>() * offset(*corner);
-            let gradient = Vector3::new(
-                0.5 * signs[0] * factor[1] * factor[2],
-                0.5 * signs[1] * factor[0] * factor[2],
-                0.5 * signs[2] * factor[0] * factor[1],
-            );
-            jacobian += offset(*corner) * gradient.transpose();
+        let (shapes, slopes) = (hexahedron::shapes(natural.into()), hexahedron::slopes(natural.into()));
+        for ((corner, shape), slope) in corners.iter().zip(shapes).zip(slopes) {
+            left -= shape * offset(*corner);
+            jacobian += offset(*corner) * Vector3::from(slope).transpose();
         }
         let Some(step) = jacobian.try_inverse().map(|inverse| inverse * left) else { break };
         // far outside of a distorted element the map folds: no further than a neighbour's far side

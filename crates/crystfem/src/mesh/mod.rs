@@ -2,14 +2,15 @@
 
 pub mod abaqus;
 mod bar;
+mod file_mesh;
+mod geometry;
 pub mod gmsh;
-mod labelled;
 pub mod layers;
 mod locate;
 mod order;
 pub mod path;
 pub mod quality;
-mod shape;
+mod read;
 mod split;
 pub mod stl;
 mod structured;
@@ -18,16 +19,17 @@ mod tube;
 mod voxels;
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use nalgebra::Vector3;
 
 use crate::error::Error;
 
+pub use crate::shape::{Cell, HEXAHEDRON_SIDES, Shape, TETRAHEDRON_SIDES};
 pub use bar::{Bar, Substrate};
-pub use labelled::ReadMesh;
+pub use file_mesh::ReadMesh;
+pub(crate) use geometry::box_around;
 pub use locate::Place;
-pub use shape::{Cell, Shape};
+pub use read::read;
 pub use split::Split;
 pub use structured::{Block, Grid, graded};
 pub use tube::Tube;
@@ -63,13 +65,6 @@ pub struct Mesh {
     pub surfaces: BTreeMap<String, Vec<Face>>,
 }
 
-/// Local nodes of the sides S1 … S6 of a hexahedron, anticlockwise seen from outside.
-pub const HEXAHEDRON_SIDES: [[usize; 4]; 6] =
-    [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
-
-/// Local nodes of the sides S1 … S4 of a tetrahedron, anticlockwise seen from outside.
-pub const TETRAHEDRON_SIDES: [[usize; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
-
 /// Sides of a box that bounds a mesh and the names of the surfaces on them: x−, x+, y−, y+, z−, z+.
 pub const BOX_SIDES: [&str; 6] = ["left", "right", "front", "back", "bottom", "top"];
 
@@ -82,13 +77,13 @@ pub struct FaceNodes {
 }
 
 impl FaceNodes {
-    /// Its corners.
+    /// Corners.
     pub fn corners(&self) -> &[u32] {
         let count = if self.count > 4 { self.count / 2 } else { self.count };
         &self.nodes[..usize::from(count)]
     }
 
-    /// Its corners, sorted, the rest [`u32::MAX`]: the same from either side.
+    /// Sorted corners, the rest [`u32::MAX`]: the same from either side.
     pub(crate) fn key(&self) -> [u32; 4] {
         let corners = self.corners();
         let mut key = [u32::MAX; 4];
@@ -135,7 +130,7 @@ impl Mesh {
         }
     }
 
-    /// Whether some element is of second order.
+    /// Returns whether some element is of second order.
     pub fn is_second_order(&self) -> bool {
         self.others.iter().any(|cell| cell.shape.is_second_order())
     }
@@ -170,31 +165,14 @@ impl Mesh {
 
     /// Nodes of a face, anticlockwise seen from outside; empty where there is no such face.
     pub fn face_nodes(&self, face: Face) -> FaceNodes {
-        let (element, side) = (face.element as usize, usize::from(face.side));
-        let mut nodes = [0; 8];
-        let mut count = 0;
-        if let Some(all) = self.hexahedra.get(element) {
-            if let Some(side) = HEXAHEDRON_SIDES.get(side) {
-                for (node, local) in nodes.iter_mut().zip(side) {
-                    *node = all[*local];
-                }
-                count = 4;
-            }
-        } else if let Some(all) = self.tetrahedra.get(element - self.hexahedra.len()) {
-            if let Some(side) = TETRAHEDRON_SIDES.get(side) {
-                for (node, local) in nodes.iter_mut().zip(side) {
-                    *node = all[*local];
-                }
-                count = 3;
-            }
-        } else if let Some(cell) = self.other(element) {
-            let (all, ring) = (cell.nodes(), cell.shape.side(face.side));
-            let next = (0..ring.len()).map(|k| (ring[k], ring[(k + 1) % ring.len()]));
-            let middles = next.filter_map(|(a, b)| cell.shape.middle(a, b));
-            for (node, local) in nodes.iter_mut().zip(ring.iter().copied().chain(middles)) {
-                *node = all[local];
-                count += 1;
-            }
+        let (all, shape) = (self.nodes(face.element), self.shape(face.element));
+        let ring = if all.is_empty() { &[] } else { shape.side(face.side) };
+        let next = (0..ring.len()).map(|k| (ring[k], ring[(k + 1) % ring.len()]));
+        let middles = next.filter_map(|(a, b)| shape.middle(a, b));
+        let (mut nodes, mut count) = ([0; 8], 0);
+        for (node, local) in nodes.iter_mut().zip(ring.iter().copied().chain(middles)) {
+            *node = all[local];
+            count += 1;
         }
         FaceNodes { nodes, count }
     }
@@ -208,26 +186,13 @@ impl Mesh {
 
     /// Corners of the smallest box around all nodes, m; `None` without nodes.
     pub fn bounds(&self) -> Option<[[f64; 3]; 2]> {
-        let first = *self.points.first()?;
-        Some(self.points.iter().fold([first, first], |[mut lower, mut upper], point| {
-            for d in 0..3 {
-                lower[d] = lower[d].min(point[d]);
-                upper[d] = upper[d].max(point[d]);
-            }
-            [lower, upper]
-        }))
+        box_around(self.points.iter().copied())
     }
 
     /// Lower and upper corner of the box around some elements, m; `None` of none.
     pub fn bounds_of(&self, elements: &[u32]) -> Option<[[f64; 3]; 2]> {
-        let places =
-            elements.iter().flat_map(|&element| self.nodes(element)).map(|&n| self.points[n as usize]);
-        places.map(|place| [place; 2]).reduce(|[mut lower, mut upper], [place, _]| {
-            for d in 0..3 {
-                (lower[d], upper[d]) = (lower[d].min(place[d]), upper[d].max(place[d]));
-            }
-            [lower, upper]
-        })
+        let nodes = elements.iter().flat_map(|&element| self.nodes(element));
+        box_around(nodes.map(|&node| self.points[node as usize]))
     }
 
     /// Nodes on faces, sorted, each once.
@@ -311,30 +276,6 @@ impl Mesh {
     pub(crate) fn point(&self, node: u32) -> Vector3<f64> {
         Vector3::from(self.points[node as usize])
     }
-}
-
-/// Reads a mesh file, `.msh` of Gmsh ([`gmsh::read`]) or `.inp` of Abaqus and CalculiX ([`abaqus::read`]), coordinates
-/// multiplied by `scale` (1e-3 for a file in mm), and checks it.
-///
-/// # Errors
-/// Another ending of the name, and what those functions refuse.
-pub fn read(path: &Path, scale: f64) -> Result<ReadMesh, Error> {
-    let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    match ending.as_str() {
-        "msh" => gmsh::read(path, scale),
-        "inp" => abaqus::read(path, scale),
-        _ => Err(Error::Mesh(format!(
-            "{}: allowed: .msh (Gmsh 2 and 4), .inp (Abaqus, CalculiX)",
-            path.display()
-        ))),
-    }
-}
-
-/// The bytes of a mesh file.
-fn read_bytes(path: &Path) -> Result<Vec<u8>, Error> {
-    std::fs::read(path).map_err(|source| {
-        Error::Shared(polycore::Error::Io { operation: "read", path: path.to_owned(), source })
-    })
 }
 
 #[cfg(test)]

@@ -77,7 +77,7 @@ impl Motion {
 }
 
 impl Move {
-    /// Its length, m.
+    /// Length, m.
     pub fn length(&self) -> f64 {
         (0..3).map(|d| (self.to[d] - self.from[d]).powi(2)).sum::<f64>().sqrt()
     }
@@ -237,7 +237,7 @@ fn told(counts: &mut BTreeMap<String, usize>) -> String {
 }
 
 fn error(path: &Path, line: usize, what: &str, found: impl ToString, allowed: impl Into<String>) -> Error {
-    crate::mesh::labelled::line_error(path, line, what, found, allowed)
+    crate::file::line_error(path, line, what, found, allowed)
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
-//! What a mesh must be before anything is computed on it.
+//! Checks of a mesh before anything is computed on it.
 
 use nalgebra::Vector3;
+use polycore::numerics::Sets;
 use rayon::prelude::*;
 
 use crate::element::natural::{Natural, Rule, corner};
@@ -34,7 +35,7 @@ pub struct Quality {
     pub aspect: (f64, u32),
     /// Parts that share no node.
     pub parts: usize,
-    /// What is allowed but should be looked at.
+    /// Findings that are allowed but should be looked at.
     pub notes: Vec<String>,
 }
 
@@ -355,27 +356,16 @@ fn check_sets(mesh: &Mesh) -> Result<(), Error> {
 
 /// Parts that share no node, and nodes of no element: their number and the first.
 fn parts(mesh: &Mesh) -> (usize, usize, usize) {
-    fn root(parent: &mut [u32], mut node: u32) -> u32 {
-        while parent[node as usize] != node {
-            // halves the way for the next one
-            parent[node as usize] = parent[parent[node as usize] as usize];
-            node = parent[node as usize];
-        }
-        node
-    }
-    let mut parent: Vec<u32> = (0..mesh.points.len() as u32).collect();
+    let mut sets = Sets::new(mesh.points.len());
     let mut used = vec![false; mesh.points.len()];
     for element in 0..mesh.element_count() as u32 {
         let nodes = mesh.nodes(element);
         for node in nodes {
             used[*node as usize] = true;
-            let (a, b) = (root(&mut parent, nodes[0]), root(&mut parent, *node));
-            // the smaller number leads, so trees stay shallow on ordered meshes
-            parent[a.max(b) as usize] = a.min(b);
+            sets.join(nodes[0], *node);
         }
     }
-    let leads = |node: usize| used[node] && parent[node] as usize == node;
-    let parts = (0..used.len()).filter(|node| leads(*node)).count();
+    let parts = (0..used.len()).filter(|&node| used[node] && sets.is_root(node as u32)).count();
     let unused = used.iter().filter(|used| !**used).count();
     (parts, unused, used.iter().position(|used| !used).unwrap_or(0))
 }

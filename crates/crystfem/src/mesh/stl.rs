@@ -41,7 +41,7 @@ pub struct Stl {
 /// [`Error::Shared`] where the file cannot be read; [`Error::File`] with the line of text, or the sizes in bytes, for what is no STL;
 /// [`Error::Mesh`] for edges that more triangles pass one way than the other, and no volume.
 pub fn read(path: &Path, scale: f64) -> Result<Stl, Error> {
-    parse(path, &super::read_bytes(path)?, scale)
+    parse(path, &crate::file::read_bytes(path)?, scale)
 }
 
 /// [`read`], of bytes; `path` is for messages only.
@@ -97,7 +97,7 @@ pub fn parse(path: &Path, bytes: &[u8], scale: f64) -> Result<Stl, Error> {
 impl Stl {
     /// Box around it, m.
     pub fn bounds(&self) -> [[f64; 3]; 2] {
-        shells::bounds(self.triangles.iter().flatten().map(|n| &self.points[*n as usize]))
+        polycore::numerics::bounds(self.triangles.iter().flatten().map(|n| self.points[*n as usize]))
     }
 
     /// Cells along each axis of the grid around it, before any of them is made.

@@ -1,4 +1,4 @@
-//! Who borders on whom, and the outer surface of the elements that exist so far.
+//! Element adjacency and outer surface of active elements.
 
 use crate::element::FaceGeometry;
 use crate::error::Error;
@@ -23,7 +23,7 @@ pub struct Surface {
     outer: Vec<bool>,
 }
 
-/// What an activation did to the outer surface; faces sorted.
+/// Change of the outer surface by an activation; faces sorted.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Change {
     /// Faces that are outer now.
@@ -121,12 +121,12 @@ impl Surface {
             .map(|number| self.face(number))
     }
 
-    /// Whether each element is active.
+    /// Returns whether each element is active.
     pub fn active(&self) -> &[bool] {
         &self.active
     }
 
-    /// Whether a face belongs to the outer surface.
+    /// Returns whether a face belongs to the outer surface.
     pub fn is_outer(&self, face: Face) -> bool {
         self.number(face).is_some_and(|number| self.outer[number as usize])
     }

@@ -4,10 +4,10 @@ use crate::error::Error;
 use crate::mesh::structured::few_enough;
 use crate::mesh::{Grid, Mesh};
 
-/// Volume of full cells over that of the body between which they may stand for it.
+/// Accepted range of cell volume over body volume.
 pub const RATIOS: [f64; 2] = [0.9, 1.1];
 
-/// Filled parts are told apart to this.
+/// Fill fractions are rounded to this.
 const BIN: f64 = 0.05;
 
 /// A body as cells.
@@ -108,7 +108,7 @@ impl Voxels {
         (sums.into_values().map(|(sum, count)| sum / count).collect(), of)
     }
 
-    /// Whether full cells may stand for the body.
+    /// Returns whether full cells may stand for the body.
     pub fn may_be_full(&self) -> bool {
         (RATIOS[0]..=RATIOS[1]).contains(&self.ratio)
     }

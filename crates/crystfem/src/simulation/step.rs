@@ -4,7 +4,7 @@ use super::{LinearSolver, Method, Points, Simulation, State};
 use crate::error::Error;
 use crate::ledger::Record;
 use crate::solver::LEVELS;
-use crate::system::At;
+use crate::system::StepInput;
 use crate::system::vector::{set, sum};
 use crate::time::{Attempt, Scheme, Stepper, Steps, Work};
 
@@ -29,7 +29,7 @@ impl Simulation {
             Steps::Fixed { .. } => None,
         };
         if self.state.rate.is_empty() && (adaptive.is_some() || scheme == Scheme::TrBdf2) {
-            let (rate, exchange) = self.stepper.rate(&self.problem, &mut self.system, &self.state)?;
+            let (rate, exchange) = self.stepper.rate(&self.problem, &mut self.system, &self.state.start())?;
             (self.state.rate, self.state.exchange) = (rate, exchange);
         }
         if jump {
@@ -75,7 +75,7 @@ impl Simulation {
             let attempt = self.stepper.attempt(
                 &self.problem,
                 &mut self.system,
-                &self.state,
+                &self.state.start(),
                 scheme,
                 [dt, end],
                 self.settings.tolerance,
@@ -156,7 +156,7 @@ impl Simulation {
         let in_place = self.in_place();
         let State { temperature: start, memory, work, time, .. } = &mut self.state;
         let Stepper { temperature, stages, .. } = &mut self.stepper;
-        let at = At { temperature, start, dt, time: *time, tangent: false };
+        let at = StepInput { temperature, start, dt, time: *time, tangent: false };
         let nodal = &self.system.nodal;
         let new = &mut stages.evaluation.memory.nodal;
         let points = if in_place {
@@ -193,7 +193,7 @@ impl Simulation {
             dt,
             stored: sum(size, |k| change[k]),
             moved: sum(size, |k| change[k].abs()),
-            sensitivity: stages.sensitivity,
+            sensitivity: stages.sensitivity(),
             exchange: attempt.exchange,
             reaction: system.fixed.iter().map(|&(equation, _)| residual[equation as usize]).sum(),
             held: system.fixed.iter().map(|&(equation, _)| residual[equation as usize].abs()).sum(),

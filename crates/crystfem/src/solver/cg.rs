@@ -111,14 +111,16 @@ pub struct ConjugateGradients {
 
 impl ConjugateGradients {
     /// See [`super::Iterative::lend`].
-    pub fn lend(&mut self, direction: &mut Vec<f64>, image: &mut Vec<f64>) {
+    pub fn swap_vectors(&mut self, direction: &mut Vec<f64>, image: &mut Vec<f64>) {
         std::mem::swap(&mut self.direction, direction);
         std::mem::swap(&mut self.image, image);
     }
 
-    /// Solves A x = r from x = 0. `inverse` is one over A's diagonal, 0 where x stays 0; `residual` becomes r − A x.
+    /// Solves A x = r from x = 0, with a multigrid cycle or the diagonal as preconditioner. `inverse` is one over A's diagonal, 0 where x
+    /// stays 0; `residual` becomes r − A x.
     pub fn solve(
         &mut self,
+        mut multigrid: Option<&mut Multigrid>,
         operator: &Operator,
         inverse: &[f64],
         residual: &mut [f64],
@@ -128,65 +130,32 @@ impl ConjugateGradients {
         let size = residual.len();
         self.direction.resize(size, 0.0);
         self.image.resize(size, 0.0);
+        self.conditioned.resize(if multigrid.is_some() { size } else { 0 }, 0.0);
         self.direction.fill(0.0);
-        solution.fill(0.0);
-        self.keep(operator, residual);
-        let mut square = norm_squared(residual, inverse);
-        let mut estimate = Estimate::new();
-        let mut factor = 0.0;
-        for iteration in 0..goal.limit {
-            if square <= goal.floor || square == 0.0 {
-                return Ended { iterations: iteration, error: 0.0, converged: true };
-            }
-            turn(factor, &mut self.direction, residual, inverse);
-            let curvature = operator.product(&self.direction, &mut self.image);
-            if (goal.stop)() || !(curvature > 0.0 && curvature.is_finite()) {
-                return Ended { iterations: iteration, error: f64::NAN, converged: false };
-            }
-            let length = square / curvature;
-            let mut next = advance(length, solution, residual, &self.direction, &self.image, inverse);
-            match estimate.next(length * square, iteration + 1, goal, operator.packed.is_some()) {
-                Next::End(ended) => return ended,
-                Next::Renew => {
-                    renew(operator, &self.right, inverse, residual, solution);
-                    next = norm_squared(residual, inverse);
-                }
-                Next::Iterate => {}
-            }
-            (factor, square) = (next / square, next);
-        }
-        estimate.given_up(goal)
-    }
-
-    /// The same with a multigrid cycle as preconditioner.
-    pub fn solve_with(
-        &mut self,
-        multigrid: &mut Multigrid,
-        operator: &Operator,
-        inverse: &[f64],
-        residual: &mut [f64],
-        solution: &mut [f64],
-        goal: &Goal,
-    ) -> Ended {
-        let size = residual.len();
-        for field in [&mut self.direction, &mut self.image, &mut self.conditioned] {
-            field.resize(size, 0.0);
-        }
         solution.fill(0.0);
         self.keep(operator, residual);
         let Self { direction, image, conditioned, right } = self;
         let mut estimate = Estimate::new();
-        let mut last = 0.0;
+        let mut last = f64::INFINITY;
         let mut norm = norm_squared(residual, inverse);
         for iteration in 0..goal.limit {
-            if norm <= goal.floor {
+            if norm <= goal.floor || norm == 0.0 {
                 return Ended { iterations: iteration, error: 0.0, converged: true };
             }
-            multigrid.apply(operator, inverse, residual, conditioned);
-            let square = dot(residual, conditioned);
-            let factor = if iteration == 0 { 0.0 } else { square / last };
+            let square = match &mut multigrid {
+                Some(multigrid) => {
+                    multigrid.apply(operator, inverse, residual, conditioned);
+                    let square = dot(residual, conditioned);
+                    let factor = square / last;
+                    blend(direction, conditioned, conditioned, |own, z, _| z + factor * own);
+                    square
+                }
+                None => {
+                    turn(norm / last, direction, residual, inverse);
+                    norm
+                }
+            };
             last = square;
-            blend(direction, conditioned, conditioned, |own, z, _| z + factor * own);
             let curvature = operator.product(direction, image);
             if (goal.stop)() || !(curvature > 0.0 && curvature.is_finite() && square > 0.0) {
                 return Ended { iterations: iteration, error: f64::NAN, converged: false };
@@ -254,6 +223,7 @@ mod tests {
         for tolerance in [1e-2, 1e-5, 1e-8] {
             let mut right = residual.clone();
             let ended = ConjugateGradients::default().solve(
+                None,
                 &operator,
                 &inverse,
                 &mut right,
@@ -283,7 +253,7 @@ mod tests {
         let mut solve = |limit| {
             let (mut residual, mut cg) = ([1.0, 2.0], ConjugateGradients::default());
             let goal = Goal { capacity: 1.0, tolerance: 1e-9, floor: 0.0, limit, stop: &|| false };
-            cg.solve(&operator, &[1.0; 2], &mut residual, &mut solution, &goal)
+            cg.solve(None, &operator, &[1.0; 2], &mut residual, &mut solution, &goal)
         };
         assert!(!solve(10).converged);
         assert!(!solve(0).converged);

@@ -1,17 +1,8 @@
-//! Supernodal Cholesky factors by faer, in the order of nested dissection: for large steps with an unchanged matrix.
-//!
-//! The analysis is made once for a system, factors once for a matrix. Always on one thread, so that the factors have
-//! the same bits on any number of them.
+//! Cholesky factors in the order of nested dissection: for large steps with an unchanged matrix. The analysis is made once for a system,
+//! factors once for a matrix.
 
 use super::{Operator, dissection};
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt::factor::LltRegularization;
-use faer::sparse::linalg::SupernodalThreshold;
-use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
-};
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{Conj, MatMut, Par, Side};
+use polycore::numerics::cholesky::{Cholesky, Pattern};
 
 /// Not among the unknowns.
 const NONE: u32 = u32::MAX;
@@ -22,12 +13,8 @@ pub struct Direct {
     order: Vec<u32>,
     /// Unknown of each equation, or [`NONE`].
     unknown: Vec<u32>,
-    /// The upper triangle, column by column.
-    starts: Vec<usize>,
-    rows: Vec<usize>,
-    symbolic: SymbolicCholesky<usize>,
+    cholesky: Cholesky,
     values: Vec<f64>,
-    scratch: MemBuffer,
     right: Vec<f64>,
 }
 
@@ -46,47 +33,35 @@ impl Direct {
         for (k, &equation) in order.iter().enumerate() {
             unknown[equation as usize] = k as u32;
         }
-        let (mut starts, mut rows) = (vec![0], Vec::new());
+        let mut pattern = Pattern { starts: vec![0], rows: Vec::new() };
         for (column, &equation) in order.iter().enumerate() {
-            let first = rows.len();
+            let first = pattern.rows.len();
             for (other, _) in operator.rows.row(equation as usize, [0.0; 2]) {
                 let row = unknown[other] as usize;
                 if row <= column {
-                    rows.push(row);
+                    pattern.rows.push(row);
                 }
             }
-            rows[first..].sort_unstable();
-            starts.push(rows.len());
+            pattern.rows[first..].sort_unstable();
+            pattern.starts.push(pattern.rows.len());
         }
-        let parameters = CholeskySymbolicParams {
-            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
-            ..Default::default()
-        };
-        let pattern = SymbolicSparseColMatRef::new_checked(order.len(), order.len(), &starts, None, &rows);
-        let ordering = SymmetricOrdering::Identity;
-        let symbolic = factorize_symbolic_cholesky(pattern, Side::Upper, ordering, parameters).ok()?;
-        let mut values = Vec::new();
-        values.try_reserve_exact(symbolic.len_val()).ok()?;
-        values.resize(symbolic.len_val(), 0.0);
-        let scratch = MemBuffer::try_new(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq)).ok()?;
         let right = vec![0.0; order.len()];
-        Some(Self { order, unknown, starts, rows, symbolic, values, scratch, right })
+        Some(Self { order, unknown, cholesky: Cholesky::analyse(pattern)?, values: Vec::new(), right })
     }
 
     /// Factors a matrix of the analysed pattern. False where it is not positive definite to working precision, or
     /// memory does not suffice.
     pub fn factor(&mut self, operator: &Operator) -> bool {
-        let mut entries = vec![0.0; self.rows.len()];
+        let pattern = self.cholesky.pattern();
+        let mut entries = vec![0.0; pattern.rows.len()];
         for (column, &equation) in self.order.iter().enumerate() {
-            let range = self.starts[column]..self.starts[column + 1];
-            let rows = &self.rows[range.clone()];
             for (other, value) in operator.rows.row(equation as usize, operator.weights) {
-                if let Ok(at) = rows.binary_search(&(self.unknown[other] as usize)) {
-                    entries[range.start + at] = value;
+                if let Some(at) = pattern.find(self.unknown[other] as usize, column) {
+                    entries[at] = value;
                 }
             }
-            if let (Some(diagonal), Some(last)) = (operator.diagonal, range.last()) {
-                entries[last] += diagonal[equation as usize];
+            if let (Some(diagonal), Some(at)) = (operator.diagonal, pattern.find(column, column)) {
+                entries[at] += diagonal[equation as usize];
             }
         }
         for face in operator.faces.iter() {
@@ -94,32 +69,16 @@ impl Direct {
             for a in 0..nodes {
                 for b in 0..nodes {
                     let [row, column] = [a, b].map(|k| self.unknown[face.equations[k] as usize]);
-                    if row <= column && column != NONE {
-                        let range = self.starts[column as usize]..self.starts[column as usize + 1];
-                        if let Ok(at) = self.rows[range.clone()].binary_search(&(row as usize)) {
-                            entries[range.start + at] += operator.weights[1] * face.values[nodes * a + b];
-                        }
+                    if row <= column
+                        && column != NONE
+                        && let Some(at) = pattern.find(row as usize, column as usize)
+                    {
+                        entries[at] += operator.weights[1] * face.values[nodes * a + b];
                     }
                 }
             }
         }
-        let size = self.order.len();
-        let pattern = SymbolicSparseColMatRef::new_checked(size, size, &self.starts, None, &self.rows);
-        let parameters = Default::default();
-        let needed = self.symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, parameters);
-        let Ok(mut memory) = MemBuffer::try_new(needed) else { return false };
-        let none =
-            LltRegularization { dynamic_regularization_delta: 0.0, dynamic_regularization_epsilon: 0.0 };
-        let factored = self.symbolic.factorize_numeric_llt(
-            &mut self.values,
-            SparseColMatRef::new(pattern, &entries),
-            Side::Upper,
-            none,
-            Par::Seq,
-            MemStack::new(&mut memory),
-            parameters,
-        );
-        factored.is_ok() && self.values.iter().all(|value| value.is_finite())
+        self.cholesky.factor(&entries, &mut self.values)
     }
 
     /// Solves A x = b with the factors; x is 0 where an equation is not among the unknowns.
@@ -127,13 +86,7 @@ impl Direct {
         for (value, &equation) in self.right.iter_mut().zip(&self.order) {
             *value = right[equation as usize];
         }
-        let size = self.right.len();
-        LltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(
-            Conj::No,
-            MatMut::from_column_major_slice_mut(&mut self.right, size, 1),
-            Par::Seq,
-            MemStack::new(&mut self.scratch),
-        );
+        self.cholesky.solve(&self.values, &mut self.right);
         solution.fill(0.0);
         for (value, &equation) in self.right.iter().zip(&self.order) {
             solution[equation as usize] = *value;

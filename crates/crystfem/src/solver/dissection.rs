@@ -1,6 +1,8 @@
 //! Nested dissection by coordinates: an order of elimination that keeps the factors of a mesh small (George 1973,
 //! doi:10.1137/0710032).
 
+use polycore::numerics::bounds;
+
 /// Equations of a part that is not cut further.
 const SMALLEST: usize = 64;
 
@@ -17,13 +19,7 @@ pub fn order(
     let mut reversed = Vec::with_capacity(equations.len());
     let mut parts = vec![equations];
     while let Some(mut part) = parts.pop() {
-        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for &equation in &part {
-            let at = place(equation);
-            for d in 0..3 {
-                (low[d], high[d]) = (low[d].min(at[d]), high[d].max(at[d]));
-            }
-        }
+        let [low, high] = bounds(part.iter().map(|&equation| place(equation)));
         let longest =
             (0..3).fold(0, |best, d| if high[d] - low[d] > high[best] - low[best] { d } else { best });
         let mut across: Vec<f64> = part.iter().map(|&equation| place(equation)[longest]).collect();

@@ -2,6 +2,7 @@
 
 mod aggregation;
 mod bicgstab;
+mod cached;
 mod cg;
 mod choice;
 mod direct;
@@ -9,6 +10,7 @@ mod dissection;
 mod multigrid;
 mod packed;
 
+pub use cached::Cached;
 pub use cg::{Ended, Goal};
 pub use choice::{Choice, LEVELS, LinearSolver, Method, Task};
 pub use direct::Direct;
@@ -66,13 +68,13 @@ pub struct Iterative {
     conjugate: ConjugateGradients,
     biconjugate: BiconjugateGradients,
     /// The preconditioner of symmetric matrices, where it is not the diagonal.
-    pub multigrid: Option<Multigrid>,
+    pub multigrid: Cached<Option<Multigrid>>,
 }
 
 impl Iterative {
     /// Swaps the work vectors of conjugate gradients, the direction and A times it, with two vectors that are free until the next call.
-    pub fn lend(&mut self, direction: &mut Vec<f64>, image: &mut Vec<f64>) {
-        self.conjugate.lend(direction, image);
+    pub fn swap_vectors(&mut self, direction: &mut Vec<f64>, image: &mut Vec<f64>) {
+        self.conjugate.swap_vectors(direction, image);
     }
 
     /// Solves A x = r from x = 0 by the method that suits the matrix. `inverse` is one over A's diagonal, 0 where x stays 0;
@@ -87,10 +89,10 @@ impl Iterative {
         goal: &Goal,
     ) -> Ended {
         let Self { conjugate, biconjugate, multigrid } = self;
-        match multigrid {
-            _ if !symmetric => biconjugate.solve(operator, inverse, residual, solution, goal),
-            Some(levels) => conjugate.solve_with(levels, operator, inverse, residual, solution, goal),
-            None => conjugate.solve(operator, inverse, residual, solution, goal),
+        if symmetric {
+            conjugate.solve(multigrid.value.as_mut(), operator, inverse, residual, solution, goal)
+        } else {
+            biconjugate.solve(operator, inverse, residual, solution, goal)
         }
     }
 }

@@ -6,6 +6,7 @@
 
 use crate::system::Rows;
 use crate::system::vector::CHUNK;
+use polycore::numerics::ordered_sum;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
@@ -103,8 +104,7 @@ impl Packed {
             }
             _ => rows.part::<false>(index, diagonal, weights, x, y),
         };
-        let parts: Vec<f64> = y.par_chunks_mut(CHUNK).enumerate().map(part).collect();
-        parts.iter().sum()
+        ordered_sum(y.par_chunks_mut(CHUNK).enumerate().map(part))
     }
 }
 

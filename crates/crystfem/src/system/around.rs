@@ -2,6 +2,7 @@
 
 use super::NONE;
 use crate::mesh::{Face, Mesh};
+use polycore::numerics::Groups;
 use rayon::prelude::*;
 
 /// Elements whose sides are looked at together.
@@ -9,8 +10,7 @@ const BATCH: usize = 4096;
 
 /// The elements around each node of a mesh, ascending, as `stride` × element + number of the node in it.
 pub struct Around {
-    starts: Vec<u32>,
-    corners: Vec<u32>,
+    corners: Groups<u32>,
     /// 8, or 32 of a mesh with second-order elements.
     stride: u32,
 }
@@ -18,36 +18,21 @@ pub struct Around {
 impl Around {
     /// Of all elements that ever exist.
     pub fn new(mesh: &Mesh, absent: &[u32]) -> Self {
-        let size = mesh.points.len();
-        let mut starts = vec![0_u32; size + 1];
         let stride = if mesh.is_second_order() { 32 } else { 8 };
         let mut exists = vec![true; mesh.element_count()];
         absent.iter().for_each(|&element| exists[element as usize] = false);
-        let each = |visit: &mut dyn FnMut(usize, u32)| {
-            for element in (0..exists.len()).filter(|&element| exists[element]) {
-                for (corner, &node) in (0..).zip(mesh.nodes(element as u32)) {
-                    visit(node as usize, stride * element as u32 + corner);
-                }
-            }
-        };
-        each(&mut |node, _| starts[node + 1] += 1);
-        for k in 0..size {
-            starts[k + 1] += starts[k];
-        }
-        let mut next = starts.clone();
-        let mut corners = vec![0; starts[size] as usize];
-        each(&mut |node, corner| {
-            corners[next[node] as usize] = corner;
-            next[node] += 1;
+        let corners = (0..exists.len()).filter(|&element| exists[element]).flat_map(|element| {
+            let corners = stride * element as u32..;
+            mesh.nodes(element as u32).iter().map(|&node| node as usize).zip(corners)
         });
-        Self { starts, corners, stride }
+        Self { corners: Groups::new(mesh.points.len(), corners), stride }
     }
 
     /// Elements of a node that are born, and its number in each.
     pub fn of(&self, node: u32, born: &[u32]) -> impl Iterator<Item = (u32, usize)> {
-        let range = self.starts[node as usize] as usize..self.starts[node as usize + 1] as usize;
         let stride = self.stride;
-        self.corners[range]
+        self.corners
+            .of(node as usize)
             .iter()
             .map(move |&corner| (corner / stride, (corner % stride) as usize))
             .filter(|&(element, _)| born[element as usize] != NONE)

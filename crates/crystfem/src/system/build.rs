@@ -12,7 +12,7 @@ use super::rows::{Row, Rows};
 use super::surfaces::{Surfaces, Touched};
 use super::{Behaviour, NONE, System};
 use crate::boundary::{Condition, Where};
-use crate::element::{self, Geometry, MOST, WIDE, WIDE_POINTS};
+use crate::element::{Geometry, MOST, WIDE, WIDE_POINTS};
 use crate::error::Error;
 use crate::mesh::{Face, Mesh};
 use crate::problem::{Capacity, Problem};
@@ -68,9 +68,9 @@ enum Own {
 impl Own {
     fn new(mesh: &Mesh, element: u32) -> Result<Self, Error> {
         let geometry = if mesh.nodes(element).len() > MOST {
-            element::wide(mesh, element).map(|geometry| Self::Wide(Box::new(geometry)))
+            mesh.geometry(element).map(|geometry| Self::Wide(Box::new(geometry)))
         } else {
-            let (corners, nodes) = element::corners(mesh, element);
+            let (corners, nodes) = mesh.positions::<MOST>(element);
             Geometry::new(&corners[..nodes]).map(|geometry| Self::Narrow(Box::new(geometry)))
         };
         geometry.ok_or_else(|| Error::Mesh(format!("element {element}: inverted")))
@@ -422,7 +422,7 @@ impl System {
                 for _ in heated[first..].iter().take_while(|&&element| element == number) {
                     let nodes = mesh.nodes(number);
                     if nodes.len() > MOST {
-                        let Some(geometry) = element::wide(mesh, number) else { continue };
+                        let Some(geometry) = mesh.geometry(number) else { continue };
                         let equation = |a: usize| equation[nodes[a] as usize];
                         let mass = geometry.mass();
                         for (a, b) in (0..nodes.len()).flat_map(|a| (0..nodes.len()).map(move |b| (a, b))) {

@@ -1,7 +1,7 @@
 //! First-order elements of equal shape and material, whose matrices are made once.
 
 use super::Behaviour;
-use crate::element::{self, Geometry, MOST};
+use crate::element::{Geometry, MOST};
 use crate::mesh::Mesh;
 
 /// Classes at most; later shapes get matrices of their own.
@@ -40,7 +40,7 @@ pub fn classify(mesh: &Mesh, material_of: &[u16], behaviours: &[Behaviour]) -> (
             if mesh.nodes(element).len() > MOST {
                 return OWN;
             }
-            let (corners, nodes) = element::corners(mesh, element);
+            let (corners, nodes) = mesh.positions::<MOST>(element);
             let mut shape = [[0.0; 3]; MOST];
             for k in 0..nodes {
                 for d in 0..3 {

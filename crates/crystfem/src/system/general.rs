@@ -11,7 +11,7 @@
 //! nodes of a line at rest; its tangent ∇N_a·D∇N_b k(T_b) is complete, and not symmetric.
 
 use super::rows::Rows;
-use super::{At, Evaluation, Moves, NONE, Points};
+use super::{Evaluation, Moves, NONE, Points, StepInput};
 use crate::element::{self, Geometry, MOST, WIDE, WIDE_POINTS};
 use crate::error::Error;
 use crate::material::Point;
@@ -109,7 +109,7 @@ impl General {
         &self,
         problem: &Problem,
         consistent: bool,
-        at: &At,
+        at: &StepInput,
         old: &Points,
         rows: &mut Rows,
         out: &mut Evaluation,
@@ -124,7 +124,7 @@ impl General {
         &self,
         problem: &Problem,
         consistent: bool,
-        at: &At,
+        at: &StepInput,
         old: &Points,
         rows: &mut Rows,
         out: &mut Evaluation,
@@ -188,14 +188,14 @@ impl General {
         &self,
         problem: &Problem,
         consistent: bool,
-        at: &At,
+        at: &StepInput,
         old: &Points,
         index: usize,
         state: &mut [f64],
         energy: &mut [f64],
     ) -> Result<Part<N>, Error> {
         let number = self.elements[index];
-        let (corners, nodes) = element::positions::<N>(&problem.mesh, number);
+        let (corners, nodes) = problem.mesh.positions::<N>(number);
         let material = &*problem.materials[usize::from(problem.material_of[number as usize])];
         let Some(geometry) = Geometry::<N, P>::new(&corners[..nodes]) else {
             return Err(Error::Mesh(format!("element {number}: inverted, flat or folded")));

@@ -48,7 +48,7 @@ pub struct Behaviour {
 }
 
 impl Behaviour {
-    /// Whether it has points at nodes.
+    /// Returns whether it has points at nodes.
     pub fn nodal(&self) -> bool {
         self.conductivity.is_some() && (self.capacity.is_none() || self.states > 0)
     }
@@ -117,7 +117,7 @@ pub struct Memory {
 
 /// Where and when a system is evaluated.
 #[derive(Clone, Copy)]
-pub struct At<'a> {
+pub struct StepInput<'a> {
     /// Temperatures of the nodes that exist, K.
     pub temperature: &'a [f64],
     /// Temperatures at the start of the increment, K.
@@ -203,12 +203,12 @@ impl System {
         &self.plan.numbering.nodes[..self.size()]
     }
 
-    /// Whether no Newton iteration is needed.
+    /// Returns whether no Newton iteration is needed.
     pub fn is_linear(&self) -> bool {
         !self.nodal.coupled && self.general.is_empty() && !self.surfaces.radiates()
     }
 
-    /// Whether the tangent is symmetric.
+    /// Returns whether the tangent is symmetric.
     pub fn is_symmetric(&self) -> bool {
         !self.general.potential
     }
@@ -232,7 +232,7 @@ impl System {
     pub fn evaluate(
         &mut self,
         problem: &Problem,
-        at: &At,
+        at: &StepInput,
         old: &Memory,
         out: &mut Evaluation,
     ) -> Result<(), Error> {

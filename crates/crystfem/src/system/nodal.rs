@@ -4,7 +4,7 @@
 //! state, whatever parts of these elements the material fills; a mesh of hexahedra needs an eighth of the calls that its Gauss points would need.
 
 use super::vector::{CHUNK, items};
-use super::{At, Behaviour, Evaluation, Moves, NONE, Points};
+use super::{Behaviour, Evaluation, Moves, NONE, Points, StepInput};
 use crate::error::Error;
 use crate::material::{Crystallization, Increments, Point, Scratch, ThermalMaterial};
 use crate::problem::Problem;
@@ -44,7 +44,7 @@ pub struct Nodal {
 
 /// Room for one work item of [`Nodal::follow`].
 #[derive(Default)]
-struct Room {
+struct PointScratch {
     /// Points of one law, and their nodes, both within the item.
     points: Vec<u32>,
     nodes: Vec<u32>,
@@ -140,7 +140,7 @@ impl Nodal {
     pub fn evaluate(
         &self,
         problem: &Problem,
-        at: &At,
+        at: &StepInput,
         old: &Points,
         out: &mut Evaluation,
     ) -> Result<(), Error> {
@@ -171,7 +171,7 @@ impl Nodal {
     pub fn follow(
         &self,
         problem: &Problem,
-        at: &At,
+        at: &StepInput,
         states: &mut [f64],
     ) -> Result<(Option<f64>, u64), Error> {
         if !self.followers.contains(&true) || self.is_empty() {
@@ -189,7 +189,7 @@ impl Nodal {
         }
         let found: Vec<(Option<f64>, u64)> = work
             .into_par_iter()
-            .map_init(Room::default, |room, (nodes, states)| {
+            .map_init(PointScratch::default, |room, (nodes, states)| {
                 self.follow_item(problem, at, nodes, states, room)
             })
             .collect::<Result<_, Error>>()?;
@@ -200,10 +200,10 @@ impl Nodal {
     fn follow_item(
         &self,
         problem: &Problem,
-        at: &At,
+        at: &StepInput,
         range: Range<usize>,
         states: &mut [f64],
-        room: &mut Room,
+        room: &mut PointScratch,
     ) -> Result<(Option<f64>, u64), Error> {
         let offset = self.starts[range.start] as usize;
         let place = |node: usize| {
@@ -211,7 +211,7 @@ impl Nodal {
             let increment = at.temperature[node] - start;
             Point { temperature: start, increment, gradient: Vector3::zeros(), dt: at.dt }
         };
-        let Room { points, nodes, z, scratch, before } = room;
+        let PointScratch { points, nodes, z, scratch, before } = room;
         let (mut ratio, mut count): (Option<f64>, u64) = (None, 0);
         let law_of = |point: usize| self.law_of[usize::from(self.material[point])];
         for (number, law) in (0..).zip(&self.laws) {
@@ -264,7 +264,7 @@ impl Nodal {
     fn respond(
         &self,
         problem: &Problem,
-        at: &At,
+        at: &StepInput,
         old: &Points,
         out: &mut Evaluation,
     ) -> Result<Option<f64>, Error> {
@@ -299,7 +299,7 @@ impl Nodal {
     fn item(
         &self,
         problem: &Problem,
-        at: &At,
+        at: &StepInput,
         old: &Points,
         first: usize,
         change: &mut [f64],

@@ -10,6 +10,7 @@ mod product;
 mod stencils;
 
 use super::vector::{CHUNK, items};
+use polycore::numerics::ordered_sum;
 use product::{Both, Product};
 use pulp::Arch;
 use rayon::prelude::*;
@@ -312,6 +313,7 @@ impl Rows {
     }
 
     /// Bytes of what is stored.
+    #[cfg(feature = "case")]
     pub fn bytes(&self) -> usize {
         let segments: usize = self.segments.iter().map(Vec::len).sum();
         segments * size_of::<Segment>() + self.own.len() * size_of::<Stencil>() + self.stencils.bytes()
@@ -441,8 +443,7 @@ impl Rows {
         y: &mut [f64],
     ) -> f64 {
         let part = |(item, y): (usize, &mut [f64])| self.part::<FLOW>(item, diagonal, weights, x, y);
-        let parts: Vec<f64> = y.par_chunks_mut(CHUNK).enumerate().map(part).collect();
-        parts.iter().sum()
+        ordered_sum(y.par_chunks_mut(CHUNK).enumerate().map(part))
     }
 
     /// [`Self::product`], or the flow, of the rows of one work item, `y`.

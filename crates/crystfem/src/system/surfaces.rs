@@ -3,7 +3,7 @@
 //! With lumped capacity they act at nodes, q(T_i) ∮ N_i dA, so that their tangent is diagonal and no cold neighbour
 //! can heat a node; with consistent capacity they act at the Gauss points of faces.
 
-use super::{At, Evaluation};
+use super::{Evaluation, StepInput};
 use crate::boundary::{Condition, STEFAN_BOLTZMANN};
 use crate::element::FaceGeometry;
 use crate::mesh::Face;
@@ -302,7 +302,7 @@ impl Surfaces {
     }
 
     /// Adds to `rate`, `conductance`, `faces`; sets `exchange`.
-    pub fn evaluate(&self, problem: &Problem, nodes: &[u32], at: &At, out: &mut Evaluation) {
+    pub fn evaluate(&self, problem: &Problem, nodes: &[u32], at: &StepInput, out: &mut Evaluation) {
         let mut exchange = Exchange::default();
         out.faces.clear();
         let place = |equation: u32| problem.mesh.points[nodes[equation as usize] as usize];
@@ -358,7 +358,7 @@ impl Surfaces {
 
 impl Part {
     /// Adds a heat loss (q, ∂q/∂T) of temperature; returns its sum, W.
-    fn lose(&self, at: &At, out: &mut Evaluation, loss: impl Fn(f64) -> (f64, f64)) -> f64 {
+    fn lose(&self, at: &StepInput, out: &mut Evaluation, loss: impl Fn(f64) -> (f64, f64)) -> f64 {
         let mut total = 0.0;
         for &(equation, area) in &self.nodes {
             let (q, slope) = loss(at.temperature[equation as usize]);
@@ -373,7 +373,13 @@ impl Part {
 
 impl<const N: usize, const P: usize> Acting<N, P> {
     /// Adds to `rate` and `faces`; `total` with what it loses, W.
-    fn lose(&self, at: &At, out: &mut Evaluation, loss: &impl Fn(f64) -> (f64, f64), mut total: f64) -> f64 {
+    fn lose(
+        &self,
+        at: &StepInput,
+        out: &mut Evaluation,
+        loss: &impl Fn(f64) -> (f64, f64),
+        mut total: f64,
+    ) -> f64 {
         let nodes = self.geometry.nodes;
         let matrix = out.faces.values.len();
         if at.tangent {

@@ -1,5 +1,6 @@
 //! Vector operations in fixed work items, so that sums have the same bits on any number of threads.
 
+use polycore::numerics::ordered_sum;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
@@ -62,12 +63,8 @@ impl WithSimd for Square<'_> {
 /// Σ w v².
 pub fn weighted_square(value: &[f64], weight: &[f64]) -> f64 {
     let arch = Arch::new();
-    let parts: Vec<f64> = value
-        .par_chunks(CHUNK)
-        .zip(weight.par_chunks(CHUNK))
-        .map(|(value, weight)| arch.dispatch(Square { value, weight }))
-        .collect();
-    parts.iter().sum()
+    let items = value.par_chunks(CHUNK).zip(weight.par_chunks(CHUNK));
+    ordered_sum(items.map(|(value, weight)| arch.dispatch(Square { value, weight })))
 }
 
 struct Dot<'a>(&'a [f64], &'a [f64]);
@@ -83,9 +80,7 @@ impl WithSimd for Dot<'_> {
 /// a·b.
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     let arch = Arch::new();
-    let parts: Vec<f64> =
-        a.par_chunks(CHUNK).zip(b.par_chunks(CHUNK)).map(|(a, b)| arch.dispatch(Dot(a, b))).collect();
-    parts.iter().sum()
+    ordered_sum(a.par_chunks(CHUNK).zip(b.par_chunks(CHUNK)).map(|(a, b)| arch.dispatch(Dot(a, b))))
 }
 
 /// Σ f(k) over 0..size, in work items, each in partial sums that do not wait for each other.
@@ -103,8 +98,7 @@ pub fn sum(size: usize, term: impl Fn(usize) -> f64 + Sync) -> f64 {
         (whole..end).for_each(|k| sums[0] += term(k));
         sums.iter().sum::<f64>()
     };
-    let parts: Vec<f64> = (0..items(size)).into_par_iter().map(item).collect();
-    parts.iter().sum()
+    ordered_sum((0..items(size)).into_par_iter().map(item))
 }
 
 /// The largest f(k) over 0..size; NaN where one is NaN.
@@ -204,16 +198,14 @@ pub fn advance(
     inverse: &[f64],
 ) -> f64 {
     let arch = Arch::new();
-    let parts: Vec<f64> = solution
+    let items = solution
         .par_chunks_mut(CHUNK)
         .zip(residual.par_chunks_mut(CHUNK))
         .zip(direction.par_chunks(CHUNK).zip(image.par_chunks(CHUNK)))
-        .zip(inverse.par_chunks(CHUNK))
-        .map(|(((solution, residual), (direction, image)), inverse)| {
-            arch.dispatch(Advance { length, solution, residual, direction, image, inverse })
-        })
-        .collect();
-    parts.iter().sum()
+        .zip(inverse.par_chunks(CHUNK));
+    ordered_sum(items.map(|(((solution, residual), (direction, image)), inverse)| {
+        arch.dispatch(Advance { length, solution, residual, direction, image, inverse })
+    }))
 }
 
 struct Turn<'a> {

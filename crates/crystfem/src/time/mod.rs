@@ -12,11 +12,12 @@
 //! The temporal error is the difference to the embedded formula of the other order, filtered by the matrix of the
 //! stage (A e = Δt Σ(b_s − b̂_s) Q_s) so that stiff parts, which are damped at once, do not count.
 
+mod matrix;
 mod stage;
 mod step;
 
 pub(crate) use stage::{Stage, Stages};
-pub(crate) use step::{Attempt, Stepper};
+pub(crate) use step::{Attempt, Start, Stepper};
 
 /// Time integrators.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]

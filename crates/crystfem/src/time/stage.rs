@@ -1,25 +1,28 @@
 //! One stage: E(T) − E(start) + a Q(T) + known = 0 at the free nodes.
 
 use super::Work;
+use super::matrix::{Matrix, key};
 use crate::error::Error;
 use crate::ledger::NOTHING;
 use crate::problem::Problem;
-use crate::solver::{Direct, Ended, Goal, Iterative, Method, Multigrid, Operator, Packed, norm_squared};
-use crate::system::vector::{blend, combine, dot, largest, set, sum};
-use crate::system::{At, Diagonal, Evaluation, FaceMatrices, Memory, System};
+use crate::solver::{
+    Cached, Direct, Ended, Goal, Iterative, Method, Multigrid, Operator, Packed, norm_squared,
+};
+use crate::system::vector::{combine, dot, largest, set, sum};
+use crate::system::{Evaluation, Memory, StepInput, System};
 
 /// Newton iterations at most.
 const MOST_ITERATIONS: usize = 60;
 /// Halvings of a Newton step at most.
 const MOST_HALVINGS: usize = 7;
 /// Newton steps in a row, where k jumps, that are taken whole though the residual does not fall.
-const MOST_WHOLE: usize = 8;
+const MOST_FULL_STEPS: usize = 8;
 /// Corrections of the balance of a linear stage at most.
 const MOST_SHIFTS: usize = 3;
 /// Share of the heat moved that the sum of all residuals may be; the audit promises 1e-10.
 const BALANCED: f64 = 2e-11;
 
-/// What a stage solves.
+/// Equation of a stage.
 #[derive(Clone, Copy)]
 pub struct Stage<'a> {
     /// Factor of Q, s.
@@ -45,44 +48,39 @@ pub struct Stages {
     pub evaluation: Evaluation,
     /// E − E(start) + a Q + known at the last temperature, J, prescribed nodes included; a correction takes it for its own.
     pub residual: Vec<f64>,
-    /// 1·A·1 over the free nodes, J/K.
-    pub sensitivity: f64,
+    /// What is wanted; factors and levels are made when first needed.
+    pub method: Method,
+    matrix: Cached<Matrix>,
+    /// Factors of the matrix; analysed for its build.
+    factors: Cached<Option<Direct>>,
+    iterative: Iterative,
+    packed: Packed,
     /// Right-hand side of a filter.
     right: Vec<f64>,
     correction: Vec<f64>,
     trial: Vec<f64>,
-    diagonal: Vec<f64>,
-    inverse: Vec<f64>,
-    /// A·1 over the free nodes with consistent capacity; else it follows from the diagonal and `free_sums`.
-    row_sums: Vec<f64>,
-    /// K·1 and M·1 over the free nodes; empty where it is nothing.
-    free_sums: [Vec<f64>; 2],
-    /// The diagonal of the rows, which Newton's iteration needs often.
-    own: Diagonal,
-    iterative: Iterative,
-    packed: Packed,
-    /// What is wanted; factors and levels are made when first needed.
-    pub method: Method,
-    factors: Option<Direct>,
-    /// For which system the levels of multigrid and for which matrix their sums were made.
-    levels_for: Option<u64>,
-    set_for: Option<(u64, u64)>,
-    /// For which generation the analysis and for which weight the factors were made.
-    analysed_for: Option<u64>,
-    factored_for: Option<(u64, u64)>,
-    capacity: f64,
-    floor: f64,
-    /// For which generation and which weight the above was made.
-    made_for: Option<(u64, u64)>,
-    sums_for: Option<(u64, u64)>,
 }
 
 impl Stages {
-    /// Forgets everything made for another system, but keeps the room for it.
+    /// Forgets everything made for another system, but keeps the memory for it.
     pub fn reset(&mut self) {
-        (self.factors, self.analysed_for, self.factored_for) = (None, None, None);
-        (self.iterative.multigrid, self.levels_for, self.set_for) = (None, None, None);
-        (self.made_for, self.sums_for) = (None, None);
+        (self.factors, self.iterative.multigrid) = Default::default();
+        self.matrix.forget();
+        self.matrix.value.reset();
+    }
+
+    /// 1·A·1 over the free nodes, J/K.
+    pub fn sensitivity(&self) -> f64 {
+        self.matrix.value.sensitivity
+    }
+
+    /// The matrix of the last evaluation, unless it is still that of a linear system.
+    fn prepare(&mut self, system: &System, weight: f64) {
+        let key = key(system, weight);
+        if !(self.matrix.is_for(key) && system.is_linear()) {
+            self.matrix.value.compute(system, &self.evaluation, weight);
+            self.matrix.made_for(key);
+        }
     }
 
     /// Solves a stage; `temperature` is the first guess and becomes the solution, at which `evaluation` and
@@ -113,7 +111,7 @@ impl Stages {
                 if self.balanced(system, stage.weight) {
                     break;
                 }
-                let shift = -sum(system.size(), |k| system.free[k] * self.residual[k]) / self.sensitivity;
+                let shift = -sum(system.size(), |k| system.free[k] * self.residual[k]) / self.sensitivity();
                 for (t, free) in temperature.iter_mut().zip(&system.free) {
                     *t += shift * free;
                 }
@@ -125,9 +123,9 @@ impl Stages {
         let mut best = (f64::INFINITY, 0);
         for iteration in 0..MOST_ITERATIONS {
             self.prepare(system, stage.weight);
-            let square = norm_squared(&self.residual, &self.inverse);
-            error = (square / self.capacity).sqrt();
-            if (error <= tolerance || square <= self.floor)
+            let square = norm_squared(&self.residual, &self.matrix.value.inverse);
+            error = (square / self.matrix.value.capacity).sqrt();
+            if (error <= tolerance || square <= self.matrix.value.floor)
                 && (iteration > 0 || error == 0.0)
                 && self.balanced(system, stage.weight)
             {
@@ -136,7 +134,7 @@ impl Stages {
             work.newton_iterations += 1;
             self.correct(problem, system, stage, (1e-3 * error).max(0.3 * tolerance), work)?;
             // line search along the correction, by the norm of this iterate's matrix
-            let inverse = std::mem::take(&mut self.inverse);
+            let inverse = std::mem::take(&mut self.matrix.value.inverse);
             let mut part = 1.0;
             let mut trial = std::mem::take(&mut self.trial);
             trial.resize(temperature.len(), 0.0);
@@ -145,13 +143,13 @@ impl Stages {
             if square < best.0 {
                 best = (square, iteration);
             }
-            let whole = !system.is_symmetric() && iteration - best.1 < MOST_WHOLE;
+            let whole = !system.is_symmetric() && iteration - best.1 < MOST_FULL_STEPS;
             for halving in 0..=MOST_HALVINGS {
                 let correction = &self.correction;
                 set(&mut trial, |k| temperature[k] + part * correction[k]);
                 let evaluated = self.evaluate(problem, system, stage, &trial, work);
                 let reached = norm_squared(&self.residual, &inverse);
-                let better = reached <= (1.0 - 0.1 * part) * square || reached <= self.floor;
+                let better = reached <= (1.0 - 0.1 * part) * square || reached <= self.matrix.value.floor;
                 let better = better || (whole && reached.is_finite());
                 if evaluated.is_ok() && (better || (halving == MOST_HALVINGS && reached.is_finite())) {
                     break;
@@ -163,8 +161,8 @@ impl Stages {
                 part *= 0.5;
             }
             std::mem::swap(temperature, &mut trial);
-            (self.trial, self.inverse) = (trial, inverse);
-            self.made_for = None;
+            (self.trial, self.matrix.value.inverse) = (trial, inverse);
+            self.matrix.forget();
         }
         Err(Error::NotConverged {
             method: "Newton's iteration",
@@ -192,20 +190,24 @@ impl Stages {
         self.right.resize(size, 0.0);
         set(&mut self.right, |k| system.free[k] * right(k));
         let packed = pack(&mut self.packed, system, weight);
-        let operator = Operator { packed, ..operator(system, &self.diagonal, weight, &self.evaluation) };
-        let goal =
-            Goal { capacity: self.capacity, tolerance, floor: 0.0, limit: limit(size), stop: &|| false };
+        let operator = Operator { packed, ..self.matrix.value.operator(system, weight, &self.evaluation) };
+        let goal = Goal {
+            capacity: self.matrix.value.capacity,
+            tolerance,
+            floor: 0.0,
+            limit: limit(size),
+            stop: &|| false,
+        };
         self.correction.resize(size, 0.0);
-        let made_for = Some((system.generation, weight.to_bits()));
-        match &mut self.factors {
-            Some(factors)
-                if self.method == Method::Factors && self.factored_for == made_for && system.is_linear() =>
-            {
+        let factored = self.factors.is_for(key(system, weight)) && system.is_linear();
+        match &mut self.factors.value {
+            Some(factors) if self.method == Method::Factors && factored => {
                 factors.solve(&self.right, &mut self.correction);
                 work.direct_solves += 1;
             }
             _ => {
-                let (inverse, right, found) = (&self.inverse, &mut self.right, &mut self.correction);
+                let (inverse, right, found) =
+                    (&self.matrix.value.inverse, &mut self.right, &mut self.correction);
                 let symmetric = system.is_symmetric();
                 let ended = self.iterative.solve(&operator, symmetric, inverse, right, found, &goal);
                 work.cg_iterations += ended.iterations as u64;
@@ -223,7 +225,7 @@ impl Stages {
         temperature: &[f64],
         work: &mut Work,
     ) -> Result<(), Error> {
-        let at = At { temperature, start: stage.start, dt: stage.dt, time: stage.time, tangent: true };
+        let at = StepInput { temperature, start: stage.start, dt: stage.dt, time: stage.time, tangent: true };
         self.evaluation.responses = 0;
         system.evaluate(problem, &at, stage.old, &mut self.evaluation)?;
         work.evaluations += 1;
@@ -238,107 +240,32 @@ impl Stages {
         Ok(())
     }
 
-    /// The diagonal of A and what follows from it.
-    fn prepare(&mut self, system: &System, weight: f64) {
-        let made_for = Some((system.generation, weight.to_bits()));
-        if self.made_for == made_for && system.is_linear() {
-            return;
-        }
-        let size = system.size();
-        let Evaluation { conductance, faces, .. } = &self.evaluation;
-        let capacity = self.evaluation.capacity(system);
-        let sums_for = Some((system.build, system.rows.versions()[1]));
-        if self.sums_for != sums_for {
-            self.free_sums = [Vec::new(), Vec::new()];
-            // rows of K add up to nothing but at prescribed neighbours
-            if system.consistent || !system.fixed.is_empty() {
-                self.free_sums[0].resize(size, 0.0);
-                system.rows.product(None, [0.0, 1.0], &system.free, &mut self.free_sums[0]);
-            }
-            if system.consistent {
-                self.free_sums[1].resize(size, 0.0);
-                system.rows.product(None, [1.0, 0.0], &system.free, &mut self.free_sums[1]);
-            }
-            self.sums_for = sums_for;
-        }
-        // A's diagonal, until it is inverted
-        self.inverse.resize(size, 0.0);
-        let [conduction, consistent] = &self.free_sums;
-        let whole = &mut self.inverse;
-        let weights = [if system.consistent { 1.0 } else { 0.0 }, weight];
-        if system.consistent {
-            whole.fill(0.0);
-        } else {
-            self.diagonal.resize(size, 0.0);
-            self.diagonal.copy_from_slice(capacity);
-            for &(equation, conductance) in conductance {
-                self.diagonal[equation as usize] += weight * conductance;
-            }
-            whole.copy_from_slice(&self.diagonal);
-        }
-        if system.is_linear() || !system.general.is_empty() {
-            // of rows that every evaluation changes, too
-            system.rows.add_diagonal(weights, whole);
-        } else {
-            let own = self.own.of(&system.rows, weights);
-            combine(whole, |k, whole| whole + own[k]);
-        }
-        if system.consistent {
-            self.row_sums.resize(size, 0.0);
-            set(&mut self.row_sums, |k| consistent[k] + weight * conduction[k]);
-            for face in faces.iter() {
-                face.add_product(weight, &system.free, &mut self.row_sums);
-                let diagonal = face.values.iter().step_by(face.equations.len() + 1);
-                for (&equation, value) in face.equations.iter().zip(diagonal) {
-                    whole[equation as usize] += weight * value;
-                }
-            }
-        }
-        // rounding of the residual: 1e-14 of a temperature of 500 K, everywhere
-        self.floor = 5e-12_f64.powi(2) * dot(&system.free, whole);
-        let inverted = |whole: f64, free: f64, _: f64| if free == 0.0 { 0.0 } else { 1.0 / whole };
-        blend(whole, &system.free, &system.free, inverted);
-        self.capacity = dot(&system.free, capacity).max(f64::MIN_POSITIVE);
-        self.sensitivity = self.column_sums(system, weight, &system.free);
-        self.made_for = made_for;
-    }
-
-    /// 1·A x over the free nodes, of x that is 0 at all others.
-    fn column_sums(&self, system: &System, weight: f64, x: &[f64]) -> f64 {
-        if system.consistent {
-            return dot(&self.row_sums, x);
-        }
-        let [conduction, _] = &self.free_sums;
-        dot(&self.diagonal, x) + if conduction.is_empty() { 0.0 } else { weight * dot(conduction, x) }
-    }
-
     /// Levels of multigrid where they are wanted, for the matrix that is prepared.
     fn raise(&mut self, problem: &Problem, system: &System, weight: f64, work: &mut Work) {
         if self.method != Method::Multigrid || !system.is_symmetric() {
-            self.iterative.multigrid = None;
+            self.iterative.multigrid.value = None;
             return;
         }
-        if self.levels_for != Some(system.build) || self.iterative.multigrid.is_none() {
-            let operator = operator(system, &self.diagonal, weight, &self.evaluation);
+        let levels = &mut self.iterative.multigrid;
+        if !levels.is_for_build(system.build) || levels.value.is_none() {
+            let operator = self.matrix.value.operator(system, weight, &self.evaluation);
             let place = |k: usize| problem.mesh.points[system.nodes()[k] as usize];
-            self.iterative.multigrid = Some(Multigrid::new(&operator, &system.free, place));
-            (self.levels_for, self.set_for) = (Some(system.build), None);
+            levels.value = Some(Multigrid::new(&operator, &system.free, place));
+            levels.forget();
             work.levels += 1;
         }
-        let made_for = Some((system.generation, weight.to_bits()));
-        if let Some(multigrid) = &mut self.iterative.multigrid
-            && (self.set_for != made_for || !system.is_linear())
-        {
-            let Evaluation { faces, .. } = &self.evaluation;
+        let key = key(system, weight);
+        let set = levels.is_for(key) && system.is_linear();
+        if let Some(multigrid) = levels.value.as_mut().filter(|_| !set) {
             if system.consistent {
                 let mut lumped = self.evaluation.capacity(system).to_vec();
                 let one = vec![1.0; lumped.len()];
-                faces.iter().for_each(|face| face.add_product(weight, &one, &mut lumped));
+                self.evaluation.faces.iter().for_each(|face| face.add_product(weight, &one, &mut lumped));
                 multigrid.set(&lumped, weight);
             } else {
-                multigrid.set(&self.diagonal, weight);
+                multigrid.set(&self.matrix.value.diagonal, weight);
             }
-            self.set_for = made_for;
+            levels.made_for(key);
         }
     }
 
@@ -353,36 +280,36 @@ impl Stages {
     ) -> Result<(), Error> {
         let size = system.size();
         // both are in the residual, and evaluated anew after the correction
-        self.iterative.lend(&mut self.evaluation.change, &mut self.evaluation.rate);
+        self.iterative.swap_vectors(&mut self.evaluation.change, &mut self.evaluation.rate);
         self.raise(problem, system, stage.weight, work);
         self.correction.resize(size, 0.0);
         combine(&mut self.residual, |k, residual| -system.free[k] * residual);
-        let operator = operator(system, &self.diagonal, stage.weight, &self.evaluation);
+        let operator = self.matrix.value.operator(system, stage.weight, &self.evaluation);
         let goal = Goal {
-            capacity: self.capacity,
+            capacity: self.matrix.value.capacity,
             tolerance,
-            floor: self.floor,
+            floor: self.matrix.value.floor,
             limit: limit(size),
             stop: stage.stop,
         };
         let factored = self.method == Method::Factors && system.is_symmetric() && {
-            let made_for = Some((system.generation, stage.weight.to_bits()));
-            if self.analysed_for != Some(system.build) {
+            let key = key(system, stage.weight);
+            if !self.factors.is_for_build(system.build) {
                 let place = |e: u32| problem.mesh.points[system.nodes()[e as usize] as usize];
-                self.factors = Direct::analyse(&operator, &system.free, place);
-                (self.analysed_for, self.factored_for) = (Some(system.build), None);
+                self.factors.value = Direct::analyse(&operator, &system.free, place);
+                self.factors.forget();
             }
             // without memory for factors, or with a matrix that is singular to rounding, the other method takes over
-            if self.factored_for != made_for || !system.is_linear() {
+            if !(self.factors.is_for(key) && system.is_linear()) {
                 work.factorizations += 1;
-                if !self.factors.as_mut().is_some_and(|factors| factors.factor(&operator)) {
-                    self.factors = None;
+                if !self.factors.value.as_mut().is_some_and(|factors| factors.factor(&operator)) {
+                    self.factors.value = None;
                 }
-                self.factored_for = made_for;
+                self.factors.made_for(key);
             }
-            self.factors.is_some()
+            self.factors.value.is_some()
         };
-        if factored && let Some(factors) = &mut self.factors {
+        if factored && let Some(factors) = &mut self.factors.value {
             factors.solve(&self.residual, &mut self.correction);
             work.direct_solves += 1;
             self.trial.resize(size, 0.0);
@@ -403,7 +330,8 @@ impl Stages {
             let operator = Operator { packed, ..operator };
             let right = &self.residual;
             total = sum(size, |k| right[k]);
-            let (inverse, right, found) = (&self.inverse, &mut self.residual, &mut self.correction);
+            let (inverse, right, found) =
+                (&self.matrix.value.inverse, &mut self.residual, &mut self.correction);
             self.iterative.solve(&operator, symmetric, inverse, right, found, &goal)
         };
         work.cg_iterations += ended.iterations as u64;
@@ -421,20 +349,20 @@ impl Stages {
         }
         // a uniform shift of the free nodes makes the balance of the whole body exact
         let left = match symmetric && !factored {
-            true => total - self.column_sums(system, stage.weight, &self.correction),
+            true => total - self.matrix.value.column_sums(system, stage.weight, &self.correction),
             false => dot(&system.free, &self.residual),
         };
-        let shift = left / self.sensitivity;
+        let shift = left / self.sensitivity();
         if shift.is_finite() {
             for (correction, free) in self.correction.iter_mut().zip(&system.free) {
                 *correction += shift * free;
             }
         }
-        self.iterative.lend(&mut self.evaluation.change, &mut self.evaluation.rate);
+        self.iterative.swap_vectors(&mut self.evaluation.change, &mut self.evaluation.rate);
         Ok(())
     }
 
-    /// Whether the free nodes' residuals add up to nothing.
+    /// Returns whether the free nodes' residuals add up to nothing.
     fn balanced(&self, system: &System, weight: f64) -> bool {
         let size = system.size();
         let total = dot(&system.free, &self.residual);
@@ -442,7 +370,7 @@ impl Stages {
         gross += weight * self.evaluation.exchange.gross();
         gross +=
             system.fixed.iter().map(|&(equation, _)| self.residual[equation as usize].abs()).sum::<f64>();
-        total.abs() <= BALANCED * (gross + NOTHING * self.sensitivity)
+        total.abs() <= BALANCED * (gross + NOTHING * self.sensitivity())
     }
 
     fn finite(&self, problem: &Problem, system: &System, stage: &Stage, found: &[f64]) -> Result<(), Error> {
@@ -461,31 +389,6 @@ fn limit(size: usize) -> usize {
 fn pack<'a>(packed: &'a mut Packed, system: &System, weight: f64) -> Option<&'a Packed> {
     let weights = if system.consistent { [1.0, weight] } else { [0.0, 1.0] };
     (system.is_symmetric() && packed.update(&system.rows, weights)).then_some(packed)
-}
-
-fn operator<'a>(
-    system: &'a System,
-    diagonal: &'a [f64],
-    weight: f64,
-    evaluation: &'a Evaluation,
-) -> Operator<'a> {
-    if system.consistent {
-        Operator {
-            rows: &system.rows,
-            diagonal: None,
-            weights: [1.0, weight],
-            faces: &evaluation.faces,
-            packed: None,
-        }
-    } else {
-        Operator {
-            rows: &system.rows,
-            diagonal: Some(diagonal),
-            weights: [0.0, weight],
-            faces: FaceMatrices::NONE,
-            packed: None,
-        }
-    }
 }
 
 fn not_finite(problem: &Problem, system: &System, stage: &Stage, found: &[f64]) -> Error {

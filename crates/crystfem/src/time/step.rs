@@ -3,16 +3,32 @@
 use super::{Scheme, Stage, Stages, Work};
 use crate::error::Error;
 use crate::problem::Problem;
-use crate::simulation::State;
 use crate::system::vector::set;
-use crate::system::{At, Evaluation, Exchange, System};
+use crate::system::{Evaluation, Exchange, Memory, StepInput, System};
 
 /// γ, and the weights w, w, d of TR-BDF2: 2 − √2, √2/4, √2/4, γ/2.
 const GAMMA: f64 = 2.0 - std::f64::consts::SQRT_2;
 const W: f64 = 0.25 * std::f64::consts::SQRT_2;
 const D: f64 = 0.5 * GAMMA;
 
-/// What a step came to.
+/// State at the start of a step.
+#[derive(Clone, Copy)]
+pub struct Start<'a> {
+    /// Time, s.
+    pub time: f64,
+    /// Temperatures, K.
+    pub temperature: &'a [f64],
+    /// Their rates of change over the last step, K/s; empty after a jump.
+    pub slope: &'a [f64],
+    /// Q, W; empty if not known.
+    pub rate: &'a [f64],
+    /// Heat going in, W.
+    pub exchange: &'a Exchange,
+    /// Material points.
+    pub memory: &'a Memory,
+}
+
+/// Result of a step.
 #[derive(Clone, Copy, Debug)]
 pub struct Attempt {
     /// Largest temporal error of a node, K; `None` if not requested.
@@ -50,12 +66,12 @@ impl Stepper {
         &mut self,
         problem: &Problem,
         system: &mut System,
-        state: &State,
+        state: &Start,
     ) -> Result<(Vec<f64>, Exchange), Error> {
         let mut evaluation = Evaluation::default();
-        let temperature = state.temperature.as_slice();
-        let at = At { temperature, start: temperature, dt: 0.0, time: state.time, tangent: false };
-        system.evaluate(problem, &at, &state.memory, &mut evaluation)?;
+        let temperature = state.temperature;
+        let at = StepInput { temperature, start: temperature, dt: 0.0, time: state.time, tangent: false };
+        system.evaluate(problem, &at, state.memory, &mut evaluation)?;
         Ok((evaluation.rate, evaluation.exchange))
     }
 
@@ -68,7 +84,7 @@ impl Stepper {
         &mut self,
         problem: &Problem,
         system: &mut System,
-        state: &State,
+        state: &Start,
         scheme: Scheme,
         [dt, end]: [f64; 2],
         tolerance: f64,
@@ -77,13 +93,13 @@ impl Stepper {
         work: &mut Work,
     ) -> Result<Attempt, Error> {
         let size = system.size();
-        let (start, slope) = (&state.temperature, &state.slope);
+        let Start { temperature: start, slope, memory: old, .. } = *state;
         self.temperature.resize(size, 0.0);
         let ahead = |time: f64, guess: &mut [f64]| match slope.is_empty() {
             true => guess.copy_from_slice(start),
             false => set(guess, |k| start[k] + time * slope[k]),
         };
-        let stage = Stage { weight: dt, dt, time: end, known: &[], start, old: &state.memory, stop };
+        let stage = Stage { weight: dt, dt, time: end, known: &[], start, old, stop };
         let mut exchange = Exchange::default();
         if scheme == Scheme::BackwardEuler {
             ahead(dt, &mut self.temperature);
@@ -91,7 +107,7 @@ impl Stepper {
             exchange.add(dt, &self.stages.evaluation.exchange);
             let step_ratio = self.stages.evaluation.step_ratio;
             let error = accuracy.map(|accuracy| {
-                let (before, after) = (&state.rate, std::mem::take(&mut self.stages.evaluation.rate));
+                let (before, after) = (state.rate, std::mem::take(&mut self.stages.evaluation.rate));
                 let difference = |k: usize| 0.5 * dt * (after[k] - before[k]);
                 let error = self.stages.filter(problem, system, dt, difference, accuracy, work);
                 self.stages.evaluation.rate = after;
@@ -107,7 +123,7 @@ impl Stepper {
         ahead(GAMMA * dt, &mut self.temperature);
         self.stages.solve(problem, system, &middle, &mut self.temperature, tolerance, work)?;
         self.middle.clone_from(&self.stages.evaluation.rate);
-        exchange.add(W * dt, &state.exchange);
+        exchange.add(W * dt, state.exchange);
         exchange.add(W * dt, &self.stages.evaluation.exchange);
         set(&mut self.known, |k| W * dt * (state.rate[k] + self.middle[k]));
         for (guess, start) in self.temperature.iter_mut().zip(start) {
@@ -120,7 +136,7 @@ impl Stepper {
         let error = accuracy.map(|accuracy| {
             // weights of the embedded formula of order 3: (1 − w)/3, (3w + 1)/3, d/3
             let after = std::mem::take(&mut self.stages.evaluation.rate);
-            let (before, middle) = (&state.rate, &self.middle);
+            let (before, middle) = (state.rate, &self.middle);
             let difference = |k: usize| {
                 let first = (W - (1.0 - W) / 3.0) * before[k];
                 dt * (first - middle[k] / 3.0 + (D - D / 3.0) * after[k])

@@ -3,6 +3,7 @@
 mod births;
 mod bodies;
 mod brick;
+mod examples;
 mod extremes;
 mod fields;
 mod followers;

@@ -1,6 +1,6 @@
 //! Several runs side by side: a row for each, with what is left at its end.
 
-use crate::report::{Report, Value};
+use crate::report::{Report, Value, aligned};
 use polycore::file::atomic_write;
 use std::path::Path;
 
@@ -128,18 +128,7 @@ impl Rows {
             }
             table.push(line);
         }
-        // what is long and stands alone may stick out
-        let mut widths = vec![0; table[0].len()];
-        for line in table.iter().filter(|line| line.len() == table[0].len()) {
-            for (width, cell) in widths.iter_mut().zip(line) {
-                *width = (*width).max(cell.chars().count());
-            }
-        }
-        let line = |line: &Vec<String>| {
-            let cells = line.iter().zip(&widths).map(|(cell, &width)| format!("{cell:<width$}"));
-            cells.collect::<Vec<_>>().join("  ").trim_end().to_owned() + "\n"
-        };
-        table.iter().map(line).collect()
+        aligned(&table)
     }
 
     /// The table as CSV, with all digits; what a run does not tell is empty.

@@ -126,32 +126,6 @@ pub fn interrupted() -> &'static (dyn Fn() -> bool + Sync) {
     &|| STOP.load(Ordering::Relaxed)
 }
 
-/// A measurement, for `bench`.
-#[derive(Clone, Debug, serde::Serialize)]
-pub struct Measurement {
-    /// What was measured.
-    pub what: String,
-    /// Its size: particles, equations, steps.
-    pub size: u64,
-    /// Threads it ran on.
-    pub threads: usize,
-    /// The value.
-    pub value: f64,
-    /// Its unit.
-    pub unit: &'static str,
-}
-
-/// Prints measurements, for people or as JSON for programs.
-pub fn print_measurements(rows: &[Measurement], json: bool) {
-    if json {
-        say!("{}", serde_json::to_string_pretty(rows).unwrap_or_default());
-        return;
-    }
-    for Measurement { what, size, threads, value, unit } in rows {
-        say!("{what:<44} {size:>9} {threads:>2} threads {value:>12.4e} {unit}");
-    }
-}
-
 /// Progress of a long run: a bar on a terminal, a line now and then in a log file.
 pub struct Progress {
     bar: ProgressBar,

@@ -38,10 +38,8 @@ pub struct Levels {
 impl Levels {
     /// Of `count` + 1 levels over the finite numbers; none where there are none.
     pub fn over(numbers: impl IntoIterator<Item = f64>, count: u16) -> Option<Self> {
-        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        for number in numbers.into_iter().filter(|number| number.is_finite()) {
-            (low, high) = (low.min(number), high.max(number));
-        }
+        let finite = numbers.into_iter().filter(|number| number.is_finite());
+        let [low, high] = polycore::numerics::range(finite);
         let step = high / f64::from(count) - low / f64::from(count);
         (low <= high).then_some(Self { low, step })
     }

@@ -1,9 +1,10 @@
 //! Particles as cells: deformed cells of a lattice that come apart at cracks, or a block for each particle of a cloud.
 
+use polycore::numerics::Sets;
 use rayon::prelude::*;
 
 use super::solid::{HEXAHEDRON, QUADRILATERAL, Solid};
-use crate::output::picture::Particles;
+use crate::output::lattice::{Cells, NONE, Sides, joined, neighbours};
 
 /// Particles of a lattice that are drawn at most, and of a cloud, whose blocks share no corners.
 const MOST: [usize; 2] = [30_000, 8_000];
@@ -31,10 +32,7 @@ pub struct Choice {
 impl Choice {
     /// The particles that are drawn: all, or every k-th along each axis of a large body; `coarser` drops more.
     pub fn of(reference: &[[f64; 3]], coarser: usize) -> Self {
-        let extent: [[f64; 2]; 3] = [0, 1, 2].map(|d| {
-            let low = reference.iter().fold(f64::INFINITY, |low, x| low.min(x[d]));
-            [low, reference.iter().fold(f64::NEG_INFINITY, |high, x| high.max(x[d]))]
-        });
+        let extent = [0, 1, 2].map(|d| polycore::numerics::range(reference.iter().map(|x| x[d])));
         let longest = extent.iter().map(|[low, high]| high - low).fold(f64::MIN_POSITIVE, f64::max);
         let flat = extent.map(|[low, high]| high - low <= 1e-9 * longest);
         let plane = flat[2];
@@ -88,37 +86,37 @@ impl Choice {
         // lengths in spacings
         let scaled = |x: &[f64; 3]| [0, 1, 2].map(|d| x[d] / self.sides[d]);
         let rest: Vec<[f64; 3]> = reference.iter().map(scaled).collect();
-        let neighbours = match self.lattice {
-            true => particles(&rest, &rest, bridge).neighbours(rest.len()),
-            false => vec![[u32::MAX; 6]; rest.len()],
+        let next = match self.lattice {
+            true => neighbours(&rest, 1.0),
+            false => vec![[NONE; 6]; rest.len()],
         };
-        let steps: Vec<Step> = positions
+        let steps: Vec<(Vec<[f64; 3]>, Vec<Sides>)> = positions
             .par_iter()
             .map(|positions| {
                 let places: Vec<[f64; 3]> = positions.iter().map(scaled).collect();
-                let joins = particles(&rest, &places, bridge).joins(&neighbours);
-                Step { places, joins }
+                let joined = joined(&places, &next, 1.0, bridge);
+                (places, joined)
             })
             .collect();
         // joined in all steps: the same corners
-        let mut joined = neighbours;
-        for step in &steps {
-            for (joined, now) in joined.iter_mut().zip(&step.joins) {
-                (0..6).filter(|&side| now[side] == u32::MAX).for_each(|side| joined[side] = u32::MAX);
+        let mut always = next;
+        for (_, joined) in &steps {
+            for (always, now) in always.iter_mut().zip(joined) {
+                (0..6).filter(|&side| now[side] == NONE).for_each(|side| always[side] = NONE);
             }
         }
-        let (owner, corner_of) = self.corners(&joined);
-        let still = Step { joins: joined, places: rest };
-        let place = |step: &Step, &(particle, corner): &(u32, u8)| -> [f64; 3] {
-            let at = step.corner(particle as usize, corner, self.plane);
+        let (owner, corner_of) = self.corners(&always);
+        let place = |positions: &[[f64; 3]], joined: &[Sides], &(particle, corner): &(u32, u8)| -> [f64; 3] {
+            let cells = Cells { positions, joined, spacing: 1.0, axes: if self.plane { 2 } else { 3 } };
+            let at = cells.corner(particle as usize, corner);
             [0, 1, 2].map(|d| at[d] * self.sides[d])
         };
-        let points: Vec<[f64; 3]> = owner.iter().map(|owner| place(&still, owner)).collect();
+        let points: Vec<[f64; 3]> = owner.iter().map(|owner| place(&rest, &always, owner)).collect();
         let moved = steps
             .par_iter()
-            .map(|step| {
+            .map(|(places, joined)| {
                 let u = |(owner, x): (&(u32, u8), &[f64; 3])| {
-                    let now = place(step, owner);
+                    let now = place(places, joined, owner);
                     [0, 1, 2].map(|d| now[d] - x[d])
                 };
                 owner.iter().zip(&points).map(u).collect()
@@ -136,28 +134,27 @@ impl Choice {
 
     /// Corners that joined cells share: a particle and a corner of its cell that stand for each, and the corners of all cells,
     /// in VTK's order.
-    fn corners(&self, joined: &[[u32; 6]]) -> (Vec<(u32, u8)>, Vec<u32>) {
+    fn corners(&self, joined: &[Sides]) -> (Vec<(u32, u8)>, Vec<u32>) {
         let count = if self.plane { 4 } else { 8 };
-        let mut parent: Vec<u32> = (0..(joined.len() * count) as u32).collect();
+        let mut sets = Sets::new(joined.len() * count);
         for (particle, beside) in joined.iter().enumerate() {
             for axis in 0..3 {
                 let other = beside[2 * axis + 1];
-                if other == u32::MAX {
+                if other == NONE {
                     continue;
                 }
                 for corner in (0..count).filter(|corner| corner >> axis & 1 == 1) {
-                    let a = root(&mut parent, (particle * count + corner) as u32);
-                    let b = root(&mut parent, (other as usize * count + (corner ^ (1 << axis))) as u32);
-                    parent[a.max(b) as usize] = a.min(b);
+                    let there = other as usize * count + (corner ^ (1 << axis));
+                    sets.join((particle * count + corner) as u32, there as u32);
                 }
             }
         }
         let order: &[usize] = if self.plane { &[0, 1, 3, 2] } else { &[0, 1, 3, 2, 4, 5, 7, 6] };
-        let mut number = vec![u32::MAX; parent.len()];
-        let (mut owners, mut corners) = (Vec::new(), Vec::with_capacity(parent.len()));
+        let mut number = vec![u32::MAX; joined.len() * count];
+        let (mut owners, mut corners) = (Vec::new(), Vec::with_capacity(number.len()));
         for particle in 0..joined.len() {
             for corner in order {
-                let root = root(&mut parent, (particle * count + corner) as u32) as usize;
+                let root = sets.root((particle * count + corner) as u32) as usize;
                 if number[root] == u32::MAX {
                     number[root] = owners.len() as u32;
                     owners.push(((root / count) as u32, (root % count) as u8));
@@ -167,78 +164,6 @@ impl Choice {
         }
         (owners, corners)
     }
-}
-
-/// Positions in spacings, and the neighbours at both ends of x, y and z without a crack in between.
-struct Step {
-    places: Vec<[f64; 3]>,
-    joins: Vec<[u32; 6]>,
-}
-
-impl Step {
-    /// A corner of a cell, the mean over the connected cells around it: bit d of its number is the end along axis d.
-    fn corner(&self, particle: usize, corner: u8, plane: bool) -> [f64; 3] {
-        let axes = if plane { 2 } else { 3 };
-        // bit d of a place: other side of the corner along axis d
-        let mut around = [u32::MAX; 8];
-        around[0] = particle as u32;
-        let (mut open, mut waiting) = ([0u8; 8], 1);
-        let side = |place: u8, d: usize| 2 * d + usize::from((corner ^ place) >> d & 1);
-        while waiting > 0 {
-            waiting -= 1;
-            let place = open[waiting];
-            for d in 0..axes {
-                let there = usize::from(place ^ (1 << d));
-                let other = self.joins[around[usize::from(place)] as usize][side(place, d)];
-                if around[there] == u32::MAX && other != u32::MAX {
-                    around[there] = other;
-                    open[waiting] = there as u8;
-                    waiting += 1;
-                }
-            }
-        }
-        let mut members = [(u32::MAX, 0u8); 8];
-        (0..8).for_each(|place| members[place] = (around[place], place as u8));
-        // one order for all cells of the corner
-        members.sort_unstable();
-        let (mut sum, mut count) = ([0.0; 3], 0.0);
-        for &(member, place) in members.iter().take_while(|(member, _)| *member != u32::MAX) {
-            let member = member as usize;
-            let halves: [[f64; 3]; 3] =
-                [0, 1, 2].map(|d| if d < axes { self.half(member, side(place, d)) } else { [0.0; 3] });
-            for d in 0..3 {
-                sum[d] += self.places[member][d] + halves[0][d] + halves[1][d] + halves[2][d];
-            }
-            count += 1.0;
-        }
-        sum.map(|x| x / count)
-    }
-
-    /// From a particle to the middle of its cell's side.
-    fn half(&self, particle: usize, side: usize) -> [f64; 3] {
-        for (side, sign) in [(side, 0.5), (side ^ 1, -0.5)] {
-            let other = self.joins[particle][side];
-            if other != u32::MAX {
-                let (from, to) = (self.places[particle], self.places[other as usize]);
-                return [0, 1, 2].map(|d| sign * (to[d] - from[d]));
-            }
-        }
-        let mut half = [0.0; 3];
-        half[side / 2] = if side % 2 == 1 { 0.5 } else { -0.5 };
-        half
-    }
-}
-
-fn particles<'a>(reference: &'a [[f64; 3]], positions: &'a [[f64; 3]], bridge: f64) -> Particles<'a> {
-    Particles { reference, positions, spacing: 1.0, bridge }
-}
-
-fn root(parent: &mut [u32], mut node: u32) -> u32 {
-    while parent[node as usize] != node {
-        parent[node as usize] = parent[parent[node as usize] as usize];
-        node = parent[node as usize];
-    }
-    node
 }
 
 /// The smallest distance of planes of points along an axis; closer ones than `same` are one.

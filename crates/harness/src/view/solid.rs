@@ -95,12 +95,7 @@ impl Solid {
     /// About `count` points: one for each cell of a grid, and the tetrahedra that keep four points (clusters of vertices:
     /// Rossignac, Borrel 1993).
     fn coarse(&self, count: usize) -> Self {
-        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for point in &self.points {
-            for d in 0..3 {
-                (low[d], high[d]) = (low[d].min(point[d]), high[d].max(point[d]));
-            }
-        }
+        let [low, high] = polycore::numerics::bounds(self.points.iter().copied());
         let longest = (0..3).map(|d| high[d] - low[d]).fold(f64::MIN_POSITIVE, f64::max);
         // corners and edges of a solid have the fewest cells: they stand for those around them
         let mut cells = vec![0u32; self.points.len()];

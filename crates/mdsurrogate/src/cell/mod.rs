@@ -174,6 +174,56 @@ impl Crystal {
         bonds
     }
 
+    /// Vectors to the bonded atoms of each atom, Å.
+    pub fn bonds_of_atoms(&self) -> Vec<Vec<Vec3>> {
+        let mut of_atom = vec![Vec::new(); self.atoms.len()];
+        for (i, j, d) in self.bonds() {
+            of_atom[i].push(d);
+            of_atom[j].push(-d);
+        }
+        of_atom
+    }
+
+    /// Shortest and longest bond between two elements, Å; ∞ and 0 where there is none.
+    pub fn bond_lengths(&self, first: Element, second: Element) -> [f64; 2] {
+        let mut range = [f64::INFINITY, 0.0_f64];
+        for (i, j, d) in self.bonds() {
+            let pair = [self.atoms[i].0, self.atoms[j].0];
+            if pair == [first, second] || pair == [second, first] {
+                range = [range[0].min(d.norm()), range[1].max(d.norm())];
+            }
+        }
+        range
+    }
+
+    /// Smallest and largest angle between bonds at the atoms of an element that have `count` of them, rad.
+    pub fn angles(&self, element: Element, count: usize) -> [f64; 2] {
+        let mut range = [f64::INFINITY, f64::NEG_INFINITY];
+        let of_atom = self.bonds_of_atoms();
+        for (_, own) in
+            self.atoms.iter().zip(of_atom).filter(|((e, _), own)| *e == element && own.len() == count)
+        {
+            for (index, a) in own.iter().enumerate() {
+                for angle in own[..index].iter().map(|b| a.angle(b)) {
+                    range = [range[0].min(angle), range[1].max(angle)];
+                }
+            }
+        }
+        range
+    }
+
+    /// Number of molecules: atoms that bonds join, also across the faces of the cell.
+    pub fn molecules(&self) -> usize {
+        let mut of: Vec<usize> = (0..self.atoms.len()).collect();
+        for (i, j, _) in self.bonds() {
+            let (from, to) = (of[i], of[j]);
+            of.iter_mut().filter(|own| **own == from).for_each(|own| *own = to);
+        }
+        of.sort_unstable();
+        of.dedup();
+        of.len()
+    }
+
     /// The text of a LAMMPS data file, `atom_style charge`, all charges 0 (QEq sets them).
     pub fn lammps_data(&self, comment: &str) -> String {
         use std::fmt::Write;

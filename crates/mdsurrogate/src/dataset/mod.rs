@@ -8,7 +8,7 @@ mod options;
 mod read;
 mod split;
 mod standardise;
-mod statistics;
+pub(crate) mod statistics;
 mod strains;
 mod stress;
 mod table;

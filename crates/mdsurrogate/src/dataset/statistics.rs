@@ -164,8 +164,13 @@ pub fn leak(set: &Dataset, split: &Split, standardisation: &Standardisation) -> 
     Some(Leak { across, within, ratio, same_path, distances })
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
+/// The value in the middle; NaN of none.
+pub(crate) fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     let middle = values.len() / 2;
-    if values.len() % 2 == 1 { values[middle] } else { 0.5 * (values[middle - 1] + values[middle]) }
+    match values.len() {
+        0 => f64::NAN,
+        n if n % 2 == 1 => values[middle],
+        _ => 0.5 * (values[middle - 1] + values[middle]),
+    }
 }

@@ -3,6 +3,7 @@
 mod ellipticity;
 mod physics;
 mod uncertainty;
+pub mod uniaxial;
 
 pub use ellipticity::Ellipticity;
 pub use physics::Physics;
@@ -11,6 +12,7 @@ pub use uncertainty::{FLAGS, Uncertainty};
 use crate::Error;
 use crate::dataset::{Dataset, Path, Row};
 use crate::surrogate::{History, Prediction, Surrogate, Workspace};
+use polycore::numerics::range;
 use polycore::tensor::Voigt;
 use std::time::Instant;
 
@@ -140,8 +142,7 @@ pub fn within_rates(run: &Path, training: &Dataset) -> Option<bool> {
     }
     let enclosed = |axis: usize| {
         let rates = || of_kind().map(|path| path.rates[axis]).filter(|rate| !rate.is_nan());
-        let least = rates().fold(f64::INFINITY, f64::min);
-        let greatest = rates().fold(f64::NEG_INFINITY, f64::max);
+        let [least, greatest] = range(rates());
         (least..=greatest).contains(&run.rates[axis])
     };
     Some(pulled().all(enclosed))

@@ -14,9 +14,6 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-mod bench;
-mod bench_points;
-mod bench_training;
 mod eval;
 mod md;
 mod predict;
@@ -64,8 +61,6 @@ enum Command {
     },
     /// Predict stress, tangent and uncertainty at the strains of a table.
     Predict(predict::Predict),
-    /// Measure the cost of a stress, a tangent and a batch, in both precisions, on one thread.
-    Bench(bench::Bench),
 }
 
 /// Runs the command line of this process.
@@ -81,7 +76,6 @@ pub fn main() -> ExitCode {
             export(&law, &output, form, OnnxOptions { single, tangent }).map_err(Failure::from)
         }
         Command::Predict(predict) => predict.print().map_err(Failure::from),
-        Command::Bench(bench) => bench.print().map_err(Failure::from),
     })
 }
 

@@ -3,6 +3,7 @@
 use crate::Error;
 use crate::network::{Activation, Architecture, MOST_NEURONS};
 use crate::random::SplitMix64;
+use polycore::numerics::range;
 use serde::{Deserialize, Serialize};
 
 /// Ranges of the hyperparameters.
@@ -124,7 +125,7 @@ impl Space {
         let share =
             |value: f64, [low, high]: [f64; 2]| if high > low { (value - low) / (high - low) } else { 0.0 };
         let rates = || self.learning_rates.iter().map(|rate| rate.log10());
-        let of_rates = [rates().fold(f64::INFINITY, f64::min), rates().fold(f64::NEG_INFINITY, f64::max)];
+        let of_rates = range(rates());
         let mut point = vec![
             share(candidate.hidden.len() as f64, self.layers.map(|count| count as f64)),
             share(candidate.learning_rate.log10(), of_rates),

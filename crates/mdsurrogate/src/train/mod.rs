@@ -1,6 +1,6 @@
 //! Training of laws on [burn](https://burn.dev): the loss (3.12), Adam, early stopping, runs that continue after a kill.
 //!
-//! [`Training`] trains one network epoch by epoch. Its [`State`] is all that changes, to the bit: a training that goes
+//! [`fit`] trains a law to the end; [`Training`] trains one network epoch by epoch. Its [`State`] is all that changes, to the bit: a training that goes
 //! on from a stored state ends with the same weights as an undisturbed one, and so does every rerun. [`ensemble`]
 //! makes a law of several of them; [`Surrogate::with_spread_limit`] tells it from where on they disagree.
 //!
@@ -9,7 +9,7 @@
 //! use mdsurrogate::kinematics::cauchy_of_material;
 //! use mdsurrogate::network::{Activation::Softplus, Architecture};
 //! use mdsurrogate::surrogate::{Header, Kind, Symmetry, Workspace};
-//! use mdsurrogate::train::{Settings, Training, ensemble};
+//! use mdsurrogate::train::{Settings, fit};
 //! use polycore::tensor::{DeformationGradient, Tensor, Voigt};
 //!
 //! // stretched along x: S₁₁ = 1 GPa · E₁₁
@@ -24,11 +24,7 @@
 //! let architecture = Architecture::new(7, &[(16, Softplus)], 1);
 //! let header = mdsurrogate::fitted::header(Kind::energy(Symmetry::Orthotropic), architecture, 1, &rows, true)?;
 //! let settings = Settings { epochs: 200, batch: 16, ..Settings::default() };
-//! let mut training = Training::new(&header, &rows, &[], settings)?;
-//! while training.ending().is_none() {
-//!     training.epoch()?;
-//! }
-//! let law = ensemble(header, &[training.best().to_vec()])?;
+//! let (law, _) = fit(header, &rows, &[], settings)?;
 //! let stress = law.stress(&Voigt::new(1.1, 1.0, 1.0, 0.0, 0.0, 0.0), &mut Workspace::default())?.stress;
 //! assert!((stress[0] / 1e6 - 50.0).abs() < 2.0, "{stress}");
 //! # Ok::<(), mdsurrogate::Error>(())
@@ -55,6 +51,7 @@ use crate::surrogate::{Header, Surrogate};
 use dataset::Examples;
 use model::Model;
 use parameters::Layout;
+use polycore::tensor::Voigt;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
@@ -316,6 +313,31 @@ impl Training {
     pub fn network(&self) -> Result<Network<f64>, Error> {
         self.layout.network(&self.header.architecture, &self.state.best)
     }
+}
+
+/// Trains all members of a law to their ends, with seeds that follow one another; returns the law with the limit of its
+/// spread on the training rows, and how each member was trained.
+///
+/// # Errors
+/// Those of [`Training`].
+pub fn fit(
+    header: Header,
+    rows: &[&Row],
+    validation: &[&Row],
+    settings: Settings,
+) -> Result<(Surrogate, Vec<State>), Error> {
+    let mut states = Vec::new();
+    for member in 0..header.members as u64 {
+        let settings = Settings { seed: settings.seed.wrapping_add(member), ..settings };
+        let mut training = Training::new(&header, rows, validation, settings)?;
+        while training.ending().is_none() {
+            training.epoch()?;
+        }
+        states.push(training.state().clone());
+    }
+    let weights: Vec<Vec<f32>> = states.iter().map(|state| state.best().to_vec()).collect();
+    let strains: Vec<Voigt> = rows.iter().map(|row| row.c).collect();
+    Ok((ensemble(header, &weights)?.with_spread_limit(&strains)?, states))
 }
 
 /// A law whose members have these parameters ([`Training::best`]).

@@ -3,8 +3,8 @@
 use crate::Error;
 use crate::dataset::Path;
 use crate::surrogate::{History, Softening, Surrogate, Workspace};
-use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
-use nalgebra::{DMatrix, DVector, Dyn, Owned};
+use nalgebra::{DMatrix, DVector};
+use polycore::numerics::least_squares::levenberg_marquardt;
 use polycore::tensor::Voigt;
 
 /// A row unloads where ‖C − 1‖ is below this part of the greatest of its run so far: fluctuations of a small cell are no
@@ -59,9 +59,10 @@ pub fn soften(law: Surrogate, paths: &[&Path], units: usize) -> Result<Surrogate
     // ln a, ln b, ln c: different c tell the units apart
     let unit = |k: usize| [(0.5 / units as f64).ln(), 1.0, 2.0 * k as f64 - 1.0];
     let start = DVector::from_vec((0..units).flat_map(unit).collect());
-    let problem = Problem { rows, greatest, scale, at: start.clone(), start };
-    let (problem, _) = LevenbergMarquardt::new().minimize(problem);
-    law.with_softening(problem.softening()).map_err(Error::from)
+    let problem = Problem { rows, greatest, scale, start: start.clone() };
+    let (residuals, jacobian) = (|at: &_| Some(problem.residuals(at)), |at: &_| Some(problem.jacobian(at)));
+    let found = levenberg_marquardt(start, 100, residuals, jacobian);
+    law.with_softening(problem.softening(&found.at)).map_err(Error::from)
 }
 
 struct Problem {
@@ -69,44 +70,29 @@ struct Problem {
     rows: Vec<(f64, History, Voigt, Voigt)>,
     greatest: f64,
     scale: f64,
-    at: DVector<f64>,
     start: DVector<f64>,
 }
 
 impl Problem {
-    fn softening(&self) -> Softening {
+    fn softening(&self, at: &DVector<f64>) -> Softening {
         let unit = |unit: &[f64]| [unit[0].exp(), unit[1].exp(), unit[2].exp()];
-        Softening { units: self.at.as_slice().chunks(3).map(unit).collect(), greatest: self.greatest }
-    }
-}
-
-impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem {
-    type ResidualStorage = Owned<f64, Dyn>;
-    type JacobianStorage = Owned<f64, Dyn, Dyn>;
-    type ParameterStorage = Owned<f64, Dyn>;
-
-    fn set_params(&mut self, at: &DVector<f64>) {
-        self.at.copy_from(at);
+        Softening { units: at.as_slice().chunks(3).map(unit).collect(), greatest: self.greatest }
     }
 
-    fn params(&self) -> DVector<f64> {
-        self.at.clone()
-    }
-
-    fn residuals(&self) -> Option<DVector<f64>> {
-        let softening = self.softening();
+    fn residuals(&self, at: &DVector<f64>) -> DVector<f64> {
+        let softening = self.softening(at);
         let row = |(energy, history, own, measured): &(f64, History, Voigt, Voigt)| -> [f64; 6] {
             let [damage, _] = softening.damage(*energy, *history);
             ((own * (1.0 - damage) - measured) / self.scale).into()
         };
-        let prior = (&self.at - &self.start) * PRIOR;
+        let prior = (at - &self.start) * PRIOR;
         let all = self.rows.iter().flat_map(row).chain(prior.iter().copied());
-        Some(DVector::from_iterator(6 * self.rows.len() + self.at.len(), all))
+        DVector::from_iterator(6 * self.rows.len() + at.len(), all)
     }
 
-    fn jacobian(&self) -> Option<DMatrix<f64>> {
-        let softening = self.softening();
-        let mut jacobian = DMatrix::zeros(6 * self.rows.len() + self.at.len(), self.at.len());
+    fn jacobian(&self, at: &DVector<f64>) -> DMatrix<f64> {
+        let softening = self.softening(at);
+        let mut jacobian = DMatrix::zeros(6 * self.rows.len() + at.len(), at.len());
         for (k, (energy, history, own, _)) in self.rows.iter().enumerate() {
             let [damage, _] = softening.damage(*energy, *history);
             for (unit, [a, b, c]) in softening.units.iter().enumerate() {
@@ -126,10 +112,10 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem {
                 }
             }
         }
-        for k in 0..self.at.len() {
+        for k in 0..at.len() {
             jacobian[(6 * self.rows.len() + k, k)] = PRIOR;
         }
-        Some(jacobian)
+        jacobian
     }
 }
 

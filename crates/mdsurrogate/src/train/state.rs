@@ -71,6 +71,11 @@ impl State {
         self.best_epoch
     }
 
+    /// Whether the best epoch is within the first tenth of a training of 20 epochs or more: the rest taught nothing.
+    pub fn is_best_early(&self) -> bool {
+        is_early(self.best_epoch as usize, self.history.len())
+    }
+
     /// Its loss ([`Epoch::judged`]); infinite before the first.
     pub fn best_loss(&self) -> f64 {
         self.best_loss
@@ -79,5 +84,21 @@ impl State {
     /// Seconds of all epochs.
     pub fn seconds(&self) -> f64 {
         self.history.iter().map(|epoch| epoch.seconds).sum()
+    }
+}
+
+fn is_early(best: usize, epochs: usize) -> bool {
+    epochs >= 20 && best as f64 <= 0.1 * epochs as f64
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn epochs_among_the_first() {
+        for (best, epochs, early) in
+            [(1, 20, true), (3, 20, false), (100, 1000, true), (101, 1000, false), (1, 5, false)]
+        {
+            assert_eq!(super::is_early(best, epochs), early, "{best} of {epochs}");
+        }
     }
 }

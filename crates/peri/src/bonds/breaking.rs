@@ -1,6 +1,6 @@
 //! Which bonds are stretched beyond what they bear.
 
-use super::{Bonds, Property};
+use super::{BodyGeometry, BondForces, Property};
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::potential::StretchRange;
 use rayon::prelude::*;
@@ -25,14 +25,14 @@ pub struct Overstretched {
 
 /// Stretches that forces of a displacement have met; empty where none were looked for.
 #[derive(Clone, Debug, Default)]
-pub struct Seen {
+pub struct StretchScan {
     /// Sites that were looked at together, a divisor of a work item.
     pub part: usize,
     /// Their extremes, in order.
     pub ranges: Vec<StretchRange>,
 }
 
-impl Seen {
+impl StretchScan {
     /// Those of `sites`, a work item, among which bonds beyond e = `least` may begin.
     fn beyond(&self, sites: Range<usize>, least: f64) -> Vec<Range<usize>> {
         if self.ranges.is_empty() {
@@ -55,12 +55,12 @@ impl Seen {
 }
 
 /// All intact bonds beyond the `critical` stretch of the weaker of their ends, each from both of them: λ² − 1 =
-/// η·(2ξ + η)/|ξ|² has the same bits from either. `seen` is what [`Bonds::force`] has collected of this displacement.
-pub fn overstretched<const D: usize, B: Bonds<D> + ?Sized>(
+/// η·(2ξ + η)/|ξ|² has the same bits from either. `seen` is what [`BondForces::force`] has collected of this displacement.
+pub fn overstretched<const D: usize, B: BondForces<D> + ?Sized>(
     bonds: &B,
     displacement: &Field<D>,
     critical: &Property,
-    seen: &Seen,
+    seen: &StretchScan,
 ) -> Vec<Overstretched> {
     let sites = bonds.sites();
     // vectorised loops find the bonds to look at; their last bits may differ from those below
@@ -111,7 +111,7 @@ pub struct Fragment {
 }
 
 /// Parts of the body that hang together by intact bonds, single particles left out; the largest first.
-pub fn fragments<const D: usize, B: Bonds<D> + ?Sized>(bonds: &B) -> Vec<Fragment> {
+pub fn fragments<const D: usize, B: BodyGeometry<D> + ?Sized>(bonds: &B) -> Vec<Fragment> {
     let roots = components(bonds, |_, _| true);
     // by its first site, which is its root
     let mut found: BTreeMap<u32, Fragment> = BTreeMap::new();
@@ -126,7 +126,7 @@ pub fn fragments<const D: usize, B: Bonds<D> + ?Sized>(bonds: &B) -> Vec<Fragmen
 }
 
 /// The first site of the part that each site hangs together with by intact bonds that `holds` accepts, by their sites.
-pub fn components<const D: usize, B: Bonds<D> + ?Sized>(
+pub fn components<const D: usize, B: BodyGeometry<D> + ?Sized>(
     bonds: &B,
     holds: impl Fn(usize, usize) -> bool,
 ) -> Vec<u32> {

@@ -1,5 +1,6 @@
 //! Points sorted into cells, for range searches.
 
+use polycore::numerics::bounds;
 use rayon::prelude::*;
 
 /// Cells farther than this from the first are one: there, positions are not known to a cell.
@@ -20,8 +21,7 @@ pub struct CellGrid<const D: usize> {
 impl<const D: usize> CellGrid<D> {
     /// Sorts points into cells of at least `edge`; at most four per point and axis in any case.
     pub fn new(points: &[[f64; D]], edge: f64) -> Self {
-        let (low, high) =
-            (extreme(points, f64::min, f64::INFINITY), extreme(points, f64::max, f64::NEG_INFINITY));
+        let [low, high] = bounds(points.iter().copied());
         let most = (points.len() as f64).powf(1.0 / D as f64).ceil().max(1.0);
         let widest = (0..D).map(|d| high[d] - low[d]).fold(0.0, f64::max);
         Self::with_edge(points, edge.max(widest / (4.0 * most)))
@@ -29,7 +29,7 @@ impl<const D: usize> CellGrid<D> {
 
     /// Sorts points into cells of `edge`, however far apart they are.
     pub fn with_edge(points: &[[f64; D]], edge: f64) -> Self {
-        let low = extreme(points, f64::min, f64::INFINITY);
+        let [low, _] = bounds(points.iter().copied());
         let (cells, starts, members, last) = (Vec::new(), Vec::new(), Vec::new(), [0; D]);
         let mut grid = Self { low, edge: edge.max(f64::MIN_POSITIVE), cells, last, starts, members };
         let keyed = points.par_iter().enumerate().map(|(k, &point)| (grid.cell(point), k as u32));
@@ -124,10 +124,6 @@ impl<const D: usize> CellGrid<D> {
             }
         }
     }
-}
-
-fn extreme<const D: usize>(points: &[[f64; D]], pick: fn(f64, f64) -> f64, start: f64) -> [f64; D] {
-    std::array::from_fn(|d| points.iter().map(|p| p[d]).fold(start, pick))
 }
 
 #[cfg(test)]

@@ -1,18 +1,18 @@
 //! A cloud of particles of any position and volume: neighbour lists in compressed rows, sorted for locality.
 
 use super::cells::CellGrid;
-use super::cloud_kernel::{CloudData, GROUP, Rows};
-use super::cloud_linear::CloudPlaces;
+use super::cloud_kernel::{CloudData, Rows};
+use super::cloud_lists::{Lists, NeighbourLists};
 use super::rows::{CloudKernel, cloud_kernel};
 use super::softening::{Softened, Softening, integrity};
 use super::{
-    Bonds, Kind, Neighbour, Overstretched, VolumeCorrection, plain_force, refuse_one_sided, surface_weight,
+    BodyGeometry, BondDamage, BondForces, Bonds, Kind, Neighbour, Overstretched, VolumeCorrection,
+    plain_force, refuse_one_sided, surface_weight,
 };
 use crate::error::Error;
 use crate::field::{Field, chunk_range};
-use crate::geometry::{Cut, Gaps, cuts_within, severed};
+use crate::geometry::{Cut, Gaps};
 use crate::potential::{KernelFit, StretchRange};
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// The bonds of a cloud.
@@ -26,52 +26,44 @@ pub struct CloudBonds<const D: usize> {
     spacing: f64,
     thickness: f64,
     volume_correction: VolumeCorrection,
-    starts: Vec<usize>,
-    neighbours: Vec<u32>,
-    /// 1/|ξ| of each bond; 0 for the padding.
-    inverse_length: Vec<f64>,
+    lists: NeighbourLists,
+    law: CloudLaw<D>,
+    factors: Option<Field<D>>,
+    softening: Softening,
+    /// θ of [`BodyGeometry::relief`].
+    relief: Option<Field<D>>,
+}
+
+/// The law of the bonds of a cloud.
+#[derive(Default)]
+struct CloudLaw<const D: usize> {
     /// w V_J of each bond, where bonds differ in it.
     weights: Vec<f64>,
     /// 2kθ, times the common w V_J.
     stiffness: f64,
-    /// All particles in the displacement last given to [`Bonds::round`]; none before.
+    /// All particles in the displacement last given to [`BondForces::prepare`]; none before.
     rows: Rows,
-    factors: Option<Field<D>>,
     kernel: Option<Box<dyn CloudKernel<D>>>,
     /// A law that only a table represents, and kθ.
     table: Option<(KernelFit, f64)>,
-    directed_bonds: u64,
-    softening: Softening,
-    /// Sites whose family a cut has parted, ascending.
-    parted: Vec<u32>,
-    /// θ of [`Bonds::relief`].
-    relief: Option<Field<D>>,
 }
 
-/// The compressed rows, and what makes a weight of a volume.
-pub(super) struct Lists<'a> {
-    pub(super) starts: &'a [usize],
-    pub(super) neighbours: &'a [u32],
-    /// 1/|ξ|; 0 where broken.
-    pub(super) inverse_length: &'a [f64],
-    /// δ and Δx of the linear volume correction.
-    partial: Option<[f64; 2]>,
-}
-
-impl Lists<'_> {
-    /// V_J/|ξ|², V_J with its correction.
-    #[inline(always)]
-    pub(super) fn share(&self, inverse: f64, volume: f64) -> f64 {
-        let share = inverse * inverse * volume;
-        match self.partial {
-            None => share,
-            // without a call, which would not inherit the instruction set
-            Some([horizon, spacing]) => {
-                let part = (horizon + 0.5 * spacing - 1.0 / inverse) / spacing;
-                share * part.clamp(0.0, 1.0)
-            }
-        }
-    }
+/// Refuses what is no cloud.
+fn check<const D: usize>(points: &[[f64; D]], volumes: &[f64], horizon: f64) -> Result<(), Error> {
+    let what = if points.is_empty() {
+        "the body contains no particle".to_owned()
+    } else if points.len() != volumes.len() {
+        format!("{} points with {} volumes", points.len(), volumes.len())
+    } else if let Some(bad) = points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
+        format!("point {bad}: found {:?} m; allowed: finite", points[bad])
+    } else if !(horizon > 0.0 && horizon.is_finite()) {
+        format!("horizon: found {horizon} m; allowed: above 0, finite")
+    } else if let Some(bad) = volumes.iter().position(|&v| !(v > 0.0 && v.is_finite())) {
+        format!("volume of point {bad}: found {}; allowed: above 0", volumes[bad])
+    } else {
+        return Ok(());
+    };
+    Err(Error::geometry(what))
 }
 
 impl<const D: usize> CloudBonds<D> {
@@ -104,104 +96,29 @@ impl<const D: usize> CloudBonds<D> {
         cuts: &[Cut<D>],
         gaps: Option<&Gaps<D>>,
     ) -> Result<Self, Error> {
-        if points.is_empty() {
-            return Err(Error::geometry("the body contains no particle".to_owned()));
-        }
-        if points.len() != volumes.len() {
-            return Err(Error::geometry(format!("{} points with {} volumes", points.len(), volumes.len())));
-        }
-        if let Some(bad) = points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
-            return Err(Error::geometry(format!("point {bad}: found {:?} m; allowed: finite", points[bad])));
-        }
-        if !(horizon > 0.0 && horizon.is_finite()) {
-            return Err(Error::geometry(format!("horizon: found {horizon} m; allowed: above 0, finite")));
-        }
-        if let Some(bad) = volumes.iter().position(|&v| !(v > 0.0 && v.is_finite())) {
-            return Err(Error::geometry(format!(
-                "volume of point {bad}: found {}; allowed: above 0",
-                volumes[bad]
-            )));
-        }
-        // bonds as long as the horizon are bonds, whatever the rounding of positions
-        let reach = horizon * (1.0 + 1e-9);
-        let order = CellGrid::new(points, horizon).order().to_vec();
-        let sorted: Vec<[f64; D]> = order.iter().map(|&i| points[i as usize]).collect();
-        let grid = CellGrid::new(&sorted, reach);
-        let lists: Vec<Result<(Vec<u32>, bool), Error>> = sorted
-            .par_iter()
-            .enumerate()
-            .map(|(own, &here)| {
-                let mut list = Vec::new();
-                let cuts = cuts_within(cuts, here, reach);
-                let gaps = gaps.and_then(|gaps| gaps.within(here, reach));
-                let (mut twin, mut parted) = (None, false);
-                grid.near(here, reach, |other| {
-                    let square: f64 = (0..D).map(|d| (sorted[other][d] - here[d]).powi(2)).sum();
-                    if other != own && square == 0.0 {
-                        twin = Some(other);
-                    }
-                    if other != own && square <= reach * reach {
-                        if severed(&cuts, here, sorted[other]) {
-                            parted = true;
-                        } else if !gaps.as_ref().is_some_and(|gaps| gaps.severs(here, sorted[other])) {
-                            list.push(other as u32);
-                        }
-                    }
-                });
-                if let Some(twin) = twin {
-                    let (a, b) = (order[own].min(order[twin]), order[own].max(order[twin]));
-                    return Err(Error::geometry(format!("points {a} and {b} are both at {here:?} m")));
-                }
-                list.sort_unstable();
-                Ok((list, parted))
-            })
-            .collect();
-        let mut starts = vec![0];
-        let mut neighbours = Vec::new();
-        let (mut directed_bonds, mut parted) = (0, Vec::new());
-        for (own, list) in lists.into_iter().enumerate() {
-            let (list, is_parted) = list?;
-            parted.extend(is_parted.then_some(own as u32));
-            directed_bonds += list.len() as u64;
-            let padded = list.len().next_multiple_of(GROUP) - list.len();
-            neighbours.extend(list);
-            neighbours.extend(std::iter::repeat_n(own as u32, padded));
-            starts.push(neighbours.len());
-        }
+        check(points, volumes, horizon)?;
+        let input_order = CellGrid::new(points, horizon).order().to_vec();
+        let sorted: Vec<[f64; D]> = input_order.iter().map(|&i| points[i as usize]).collect();
+        let lists = NeighbourLists::new(&sorted, &input_order, horizon, cuts, gaps)?;
         let mut position = Field::zeros(sorted.len());
         for (site, &point) in sorted.iter().enumerate() {
             position.set(site, point);
         }
-        let mut inverse_length = Vec::with_capacity(neighbours.len());
-        for own in 0..sorted.len() {
-            for &other in &neighbours[starts[own]..starts[own + 1]] {
-                let square: f64 = (0..D).map(|d| (sorted[other as usize][d] - sorted[own][d]).powi(2)).sum();
-                inverse_length.push(if square > 0.0 { 1.0 / square.sqrt() } else { 0.0 });
-            }
-        }
-        let volumes: Vec<f64> = order.iter().map(|&i| volumes[i as usize]).collect();
+        let volumes: Vec<f64> = input_order.iter().map(|&i| volumes[i as usize]).collect();
         let mean = volumes.iter().sum::<f64>() / volumes.len() as f64 / thickness;
         let bonds = Self {
             particles: (0..sorted.len() as u32).collect(),
             position,
             volumes,
-            input_order: order,
+            input_order,
             horizon,
             spacing: mean.powf(1.0 / D as f64),
             thickness,
             volume_correction,
-            starts,
-            neighbours,
-            inverse_length,
-            weights: Vec::new(),
-            stiffness: 0.0,
-            rows: Rows::default(),
+            lists,
+            law: CloudLaw::default(),
             factors: None,
-            kernel: None,
-            table: None,
-            directed_bonds,
             softening: Softening::default(),
-            parted,
             relief: None,
         };
         refuse_one_sided(&bonds)?;
@@ -220,37 +137,35 @@ impl<const D: usize> CloudBonds<D> {
 
     /// Sites whose family a cut has parted, ascending.
     pub fn parted(&self) -> &[u32] {
-        &self.parted
+        &self.lists.parted
+    }
+
+    pub(super) fn positions(&self) -> &Field<D> {
+        &self.position
+    }
+
+    pub(super) fn volumes(&self) -> &[f64] {
+        &self.volumes
     }
 
     pub(super) fn lists(&self) -> Lists<'_> {
         let partial =
             (self.volume_correction == VolumeCorrection::Linear).then_some([self.horizon, self.spacing]);
-        let Self { starts, neighbours, inverse_length, .. } = self;
+        let NeighbourLists { starts, neighbours, inverse_length, .. } = &self.lists;
         Lists { starts, neighbours, inverse_length, partial }
-    }
-
-    /// The particles for both passes, without θ.
-    pub fn bare_places(&self) -> CloudPlaces<D> {
-        CloudPlaces::new(&self.position, &self.volumes)
     }
 
     /// A bond of a site by its [`Neighbour::index`], as if it were not softened.
     pub fn whole_bond(&self, site: usize, index: u32) -> Neighbour<D> {
-        self.whole(site, self.starts[site] + index as usize)
-    }
-
-    /// The bonds of a site, and what its list is padded with.
-    fn row(&self, site: usize) -> Range<usize> {
-        self.starts[site]..self.starts[site + 1]
+        self.whole(site, self.lists.starts[site] + index as usize)
     }
 
     /// e = λ² − 1 of the bonds of a site; 0 of those that are broken.
     fn excesses<'a>(&'a self, displacement: &'a Field<D>, site: usize) -> impl Iterator<Item = f64> + 'a {
         let (position, moved) = (self.position.components(), displacement.components());
         let (here, own) = (self.position.get(site), displacement.get(site));
-        let row = self.row(site);
-        let bonds = self.neighbours[row.clone()].iter().zip(&self.inverse_length[row]);
+        let row = self.lists.row(site);
+        let bonds = self.lists.neighbours[row.clone()].iter().zip(&self.lists.inverse_length[row]);
         bonds.map(move |(&other, inverse)| {
             let mut e = 0.0;
             for d in 0..D {
@@ -264,21 +179,21 @@ impl<const D: usize> CloudBonds<D> {
 
     /// All sites from the first to the last that bonds of these have as ends.
     fn met_by(&self, sites: Range<usize>) -> Range<usize> {
-        let met = &self.neighbours[self.starts[sites.start]..self.starts[sites.end]];
+        let met = &self.lists.neighbours[self.lists.starts[sites.start]..self.lists.starts[sites.end]];
         let first = met.iter().min().map_or(sites.start, |&first| sites.start.min(first as usize));
         let last = met.iter().max().map_or(sites.end, |&last| sites.end.max(last as usize + 1));
         first..last
     }
 
     fn whole(&self, site: usize, k: usize) -> Neighbour<D> {
-        let other = self.neighbours[k] as usize;
+        let other = self.lists.neighbours[k] as usize;
         let (here, there) = (self.position.get(site), self.position.get(other));
         let bond: [f64; D] = std::array::from_fn(|d| there[d] - here[d]);
         let length = bond.iter().map(|x| x * x).sum::<f64>().sqrt();
         let volume = self.volumes[other] * self.volume_correction.factor(length, self.horizon, self.spacing);
         let surface =
             self.factors.as_ref().map_or(1.0, |g| surface_weight(bond, length, g.get(site), g.get(other)));
-        let index = (k - self.starts[site]) as u32;
+        let index = (k - self.lists.starts[site]) as u32;
         let relief = self.relief.as_ref().map_or([0.0; D], |theta| {
             let (here, there) = (theta.get(site), theta.get(other));
             std::array::from_fn(|d| there[d] - here[d])
@@ -293,7 +208,7 @@ fn weakened<const D: usize>(bond: Neighbour<D>, soft: &[Softened]) -> Neighbour<
     Neighbour { volume: part * bond.volume, weight: part * bond.weight, ..bond }
 }
 
-impl<const D: usize> Bonds<D> for CloudBonds<D> {
+impl<const D: usize> BodyGeometry<D> for CloudBonds<D> {
     fn sites(&self) -> usize {
         self.volumes.len()
     }
@@ -320,8 +235,8 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
 
     fn neighbours(&self, site: usize, visit: &mut dyn FnMut(Neighbour<D>)) {
         let soft = self.softening.among(site..site + 1);
-        for k in self.row(site) {
-            if self.neighbours[k] as usize != site {
+        for k in self.lists.row(site) {
+            if self.lists.neighbours[k] as usize != site {
                 visit(weakened(self.whole(site, k), soft));
             }
         }
@@ -332,43 +247,49 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
     }
 
     fn bonded(&self, site: usize) -> u32 {
-        let row = &self.inverse_length[self.starts[site]..self.starts[site + 1]];
+        let row = &self.lists.inverse_length[self.lists.row(site)];
         row.iter().map(|&inverse| u32::from(inverse > 0.0)).sum()
     }
 
     fn is_bonded(&self, site: usize, other: usize) -> bool {
-        site != other && self.neighbours[self.starts[site]..self.starts[site + 1]].contains(&(other as u32))
+        site != other && self.lists.neighbours[self.lists.row(site)].contains(&(other as u32))
     }
 
+    fn relief(&self) -> Option<&Field<D>> {
+        self.relief.as_ref()
+    }
+}
+
+impl<const D: usize> BondForces<D> for CloudBonds<D> {
     fn set_law(&mut self, fit: &KernelFit, modulus: f64) {
         let common = self.volumes[0];
         let alike = self.factors.is_none()
             && self.volume_correction == VolumeCorrection::None
             && self.volumes.iter().all(|&v| v == common);
-        self.stiffness = 2.0 * modulus * if alike { common } else { 1.0 };
-        self.weights = Vec::new();
+        self.law.stiffness = 2.0 * modulus * if alike { common } else { 1.0 };
+        self.law.weights = Vec::new();
         if !alike {
             let weight = |site: usize, k: usize| {
-                if self.neighbours[k] as usize == site { 0.0 } else { self.whole(site, k).weight }
+                if self.lists.neighbours[k] as usize == site { 0.0 } else { self.whole(site, k).weight }
             };
-            let of_site = |site: usize| (self.starts[site]..self.starts[site + 1]).map(move |k| (site, k));
-            self.weights =
+            let of_site = |site: usize| (self.lists.row(site)).map(move |k| (site, k));
+            self.law.weights =
                 (0..self.volumes.len()).flat_map(of_site).map(|(site, k)| weight(site, k)).collect();
         }
-        self.kernel = cloud_kernel(fit);
-        self.table = self.kernel.is_none().then(|| (fit.clone(), modulus));
+        self.law.kernel = cloud_kernel(fit);
+        self.law.table = self.law.kernel.is_none().then(|| (fit.clone(), modulus));
     }
 
     fn set_factors(&mut self, factors: Field<D>) {
         self.factors = Some(factors);
     }
 
-    fn round(&mut self, displacement: &Field<D>) {
-        match self.kernel {
-            Some(_) if self.rows.is_empty() => {
-                self.rows = Rows::new(&self.position, displacement, 0..self.volumes.len());
+    fn prepare(&mut self, displacement: &Field<D>) {
+        match self.law.kernel {
+            Some(_) if self.law.rows.is_empty() => {
+                self.law.rows = Rows::new(&self.position, displacement, 0..self.volumes.len());
             }
-            Some(_) => self.rows.load(displacement),
+            Some(_) => self.law.rows.load(displacement),
             None => {}
         }
     }
@@ -380,29 +301,29 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
         force: &mut [&mut [f64]; D],
         track: Option<&mut StretchRange>,
     ) {
-        if let Some(kernel) = &self.kernel {
+        if let Some(kernel) = &self.law.kernel {
             let own;
-            let rows = if self.rows.is_empty() {
+            let rows = if self.law.rows.is_empty() {
                 own = Rows::new(&self.position, displacement, self.met_by(start..start + force[0].len()));
                 &own
             } else {
-                assert!(self.rows.are_of::<D>(self.volumes.len()));
+                assert!(self.law.rows.are_of::<D>(self.volumes.len()));
                 debug_assert!(
-                    self.rows.holds(displacement, start..start + force[0].len()),
+                    self.law.rows.holds(displacement, start..start + force[0].len()),
                     "of another displacement"
                 );
-                &self.rows
+                &self.law.rows
             };
             let data = CloudData {
                 rows,
-                starts: &self.starts,
-                neighbours: &self.neighbours,
-                inverse_length: &self.inverse_length,
-                weights: &self.weights,
-                stiffness: self.stiffness,
+                starts: &self.lists.starts,
+                neighbours: &self.lists.neighbours,
+                inverse_length: &self.lists.inverse_length,
+                weights: &self.law.weights,
+                stiffness: self.law.stiffness,
             };
             kernel.run(&data, start, force, track);
-        } else if let Some((fit, modulus)) = &self.table {
+        } else if let Some((fit, modulus)) = &self.law.table {
             plain_force(self, fit, *modulus, displacement, start, force, track);
         }
     }
@@ -418,7 +339,7 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
         for site in sites {
             for (k, e) in self.excesses(displacement, site).enumerate() {
                 // below no stretch, broken bonds have 0
-                if e > least && self.inverse_length[self.starts[site] + k] > 0.0 {
+                if e > least && self.lists.inverse_length[self.lists.starts[site] + k] > 0.0 {
                     found.push([site as u32, k as u32]);
                 }
             }
@@ -426,22 +347,16 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
         found
     }
 
-    fn sever(&mut self, bonds: &[Overstretched]) {
-        for bond in bonds {
-            // as the padding of the lists: a bond of no stiffness to itself
-            let k = self.starts[bond.site as usize] + bond.index as usize;
-            self.neighbours[k] = bond.site;
-            self.inverse_length[k] = 0.0;
-        }
-        self.directed_bonds -= bonds.len() as u64;
-    }
-
     fn set_relief(&mut self, relief: Field<D>) {
         self.relief = Some(relief);
     }
+}
 
-    fn relief(&self) -> Option<&Field<D>> {
-        self.relief.as_ref()
+impl<const D: usize> BondDamage<D> for CloudBonds<D> {
+    fn sever(&mut self, bonds: &[Overstretched]) {
+        for bond in bonds {
+            self.lists.sever(bond.site, self.lists.starts[bond.site as usize] + bond.index as usize);
+        }
     }
 
     fn softening(&self) -> &Softening {
@@ -456,24 +371,22 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
         let bits = |part: &[f64]| {
             part.iter().enumerate().fold(0, |word, (k, inverse)| word | u64::from(*inverse > 0.0) << k)
         };
-        self.inverse_length.chunks(64).map(bits).collect()
+        self.lists.inverse_length.chunks(64).map(bits).collect()
     }
 
     fn bit(&self, site: usize, index: u32) -> (usize, u64) {
-        let k = self.starts[site] + index as usize;
+        let k = self.lists.starts[site] + index as usize;
         (k / 64, 1 << (k % 64))
     }
 
     fn restore(&mut self, words: &[u64]) -> bool {
-        if words.len() != self.inverse_length.len().div_ceil(64) {
+        if words.len() != self.lists.inverse_length.len().div_ceil(64) {
             return false;
         }
         for site in 0..self.volumes.len() {
-            for k in self.starts[site]..self.starts[site + 1] {
-                if self.inverse_length[k] > 0.0 && words[k / 64] >> (k % 64) & 1 == 0 {
-                    self.neighbours[k] = site as u32;
-                    self.inverse_length[k] = 0.0;
-                    self.directed_bonds -= 1;
+            for k in self.lists.row(site) {
+                if self.lists.inverse_length[k] > 0.0 && words[k / 64] >> (k % 64) & 1 == 0 {
+                    self.lists.sever(site as u32, k);
                 }
             }
         }
@@ -481,15 +394,17 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
     }
 
     fn directed_bonds(&self) -> u64 {
-        self.directed_bonds
+        self.lists.directed_bonds
     }
+}
 
+impl<const D: usize> Bonds<D> for CloudBonds<D> {
     fn bytes(&self) -> usize {
-        let bonds = self.neighbours.len() * (4 + 8) + self.weights.len() * 8;
+        let bonds = self.lists.neighbours.len() * (4 + 8) + self.law.weights.len() * 8;
         bonds
             + self.volumes.len() * (8 * D + 8 + 4 + 4 + 8)
-            + self.parted.len() * 4
-            + self.rows.bytes()
+            + self.lists.parted.len() * 4
+            + self.law.rows.bytes()
             + [&self.factors, &self.relief].into_iter().flatten().map(|f| 8 * D * f.sites()).sum::<usize>()
     }
 

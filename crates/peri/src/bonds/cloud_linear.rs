@@ -2,9 +2,9 @@
 //!
 //! What a neighbour brings lies together in four lanes, so that plain loops become vector instructions.
 
-use super::CloudBonds;
-use super::cloud::Lists;
+use super::cloud_lists::Lists;
 use super::kernel::{Pass, dispatch};
+use super::{BodyGeometry, CloudBonds};
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::potential::StretchRange;
 use pulp::{Arch, Simd, WithSimd};
@@ -27,7 +27,7 @@ struct Place {
 /// The particles of a cloud as both passes read them.
 pub struct CloudPlaces<const D: usize> {
     places: Vec<Place>,
-    /// θ of [`super::Bonds::relief`]; empty where there is none.
+    /// θ of [`BodyGeometry::relief`]; empty where there is none.
     shifts: Vec<Lanes>,
 }
 
@@ -76,10 +76,15 @@ fn lanes<const D: usize>(value: [f64; D]) -> Lanes {
 }
 
 impl<const D: usize> CloudBonds<D> {
+    /// The particles for both passes, without θ.
+    pub fn bare_places(&self) -> CloudPlaces<D> {
+        CloudPlaces::new(self.positions(), self.volumes())
+    }
+
     /// The particles for [`Self::moments`] and [`Self::linear_force`].
     pub fn places(&self) -> CloudPlaces<D> {
         let mut places = self.bare_places();
-        if let Some(relief) = super::Bonds::relief(self) {
+        if let Some(relief) = self.relief() {
             places.shifts = (0..relief.sites()).map(|site| lanes(relief.get(site))).collect();
         }
         places

@@ -9,12 +9,13 @@ use super::rows::{LatticeKernel, StencilBond, lattice_kernel};
 use super::softening::{Softened, Softening, integrity};
 use super::stencil::{Stencil, fullest, layout, storage};
 use super::{
-    Bonds, Kind, Neighbour, Overstretched, VolumeCorrection, plain_force, refuse_one_sided, surface_weight,
+    BodyGeometry, BondDamage, BondForces, Bonds, Kind, Neighbour, Overstretched, VolumeCorrection,
+    plain_force, refuse_one_sided, surface_weight,
 };
 use crate::error::Error;
 use crate::field::{Field, chunk_range};
 use crate::geometry::{Cut, Gaps, Lattice, refuse_too_large};
-use crate::potential::{KernelFit, StretchRange, TangentTable};
+use crate::potential::{EnergyTable, KernelFit, StretchRange, TangentTable};
 use mixed::Mixed;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -236,30 +237,7 @@ impl<const D: usize> LatticeBonds<D> {
         }
     }
 
-    /// Σ share ξ⊗ξ/|ξ|² and Σ share η⊗ξ/|ξ|² over the intact bonds of the sites of a work item; `None` where bonds soften.
-    pub(crate) fn gradient_sums(
-        &self,
-        displacement: &Field<D>,
-        chunk: usize,
-    ) -> Option<Vec<GradientSums<D>>> {
-        let sites = chunk_range(chunk, self.sites);
-        self.softening.bonds().is_empty().then(|| self.spans(displacement).gradient_sums(sites))
-    }
-
-    /// Of each site of a work item, Σ_J (2 w V_J/|ξ|)·max(table(e), least)·(1 + max_{d≠e} |n_d n_e|), n the direction of the
-    /// deformed bond; `None` where bonds have weights of their own.
-    pub(crate) fn stiffness(
-        &self,
-        displacement: &Field<D>,
-        chunk: usize,
-        table: &TangentTable,
-        least: f64,
-    ) -> Option<Vec<f64>> {
-        let (sites, volume) = (chunk_range(chunk, self.sites), self.lattice.volume);
-        self.is_uniform().then(|| self.spans(displacement).stiffness(sites, volume, table, least))
-    }
-
-    /// [`Bonds::force`] in double precision.
+    /// [`BondForces::force`] in double precision.
     fn double_force(
         &self,
         displacement: &Field<D>,
@@ -297,7 +275,7 @@ fn shift<const D: usize>(strides: [usize; D], offset: [i32; D]) -> isize {
     (0..D).map(|d| strides[d] as isize * offset[d] as isize).sum()
 }
 
-impl<const D: usize> Bonds<D> for LatticeBonds<D> {
+impl<const D: usize> BodyGeometry<D> for LatticeBonds<D> {
     fn sites(&self) -> usize {
         self.sites
     }
@@ -365,6 +343,16 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
         })
     }
 
+    fn whole_family(&self) -> Option<u32> {
+        Some(self.stencil.offsets.len() as u32)
+    }
+
+    fn has_whole_family(&self, site: usize) -> bool {
+        self.is_uniform() && self.bonded(site) as usize == self.stencil.offsets.len()
+    }
+}
+
+impl<const D: usize> BondForces<D> for LatticeBonds<D> {
     fn set_law(&mut self, fit: &KernelFit, modulus: f64) {
         let stencil = self.stencil_bonds(modulus);
         if let Some(mixed) = &mut self.mixed {
@@ -402,7 +390,7 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
         TILE
     }
 
-    fn round(&mut self, displacement: &Field<D>) {
+    fn prepare(&mut self, displacement: &Field<D>) {
         if let Some(mixed) = &mut self.mixed {
             mixed.round(displacement, self.lattice.spacing);
         }
@@ -428,6 +416,29 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
         self.spans(displacement).beyond(sites, least)
     }
 
+    fn energy_sum(&self, displacement: &Field<D>, table: &EnergyTable) -> Option<f64> {
+        self.energy(displacement, |e| table.value(e))
+    }
+
+    fn stiffness_sums(
+        &self,
+        displacement: &Field<D>,
+        chunk: usize,
+        table: &TangentTable,
+        least: f64,
+    ) -> Option<Vec<f64>> {
+        let (sites, volume) = (chunk_range(chunk, self.sites), self.lattice.volume);
+        self.is_uniform().then(|| self.spans(displacement).stiffness(sites, volume, table, least))
+    }
+
+    /// Of bonds that do not soften.
+    fn gradient_sums(&self, displacement: &Field<D>, chunk: usize) -> Option<Vec<GradientSums<D>>> {
+        let sites = chunk_range(chunk, self.sites);
+        self.softening.bonds().is_empty().then(|| self.spans(displacement).gradient_sums(sites))
+    }
+}
+
+impl<const D: usize> BondDamage<D> for LatticeBonds<D> {
     fn sever(&mut self, bonds: &[Overstretched]) {
         for bond in bonds {
             let (site, k) = (bond.site as usize, bond.index as usize);
@@ -473,7 +484,9 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
     fn directed_bonds(&self) -> u64 {
         self.directed_bonds
     }
+}
 
+impl<const D: usize> Bonds<D> for LatticeBonds<D> {
     fn bytes(&self) -> usize {
         let factors = self.factors.as_ref().map_or(0, |_| D * self.sites * 8);
         let mixed = self.mixed.as_ref().map_or(0, Mixed::bytes);

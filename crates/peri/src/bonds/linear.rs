@@ -1,10 +1,12 @@
 //! Sums over the bonds of a lattice: energies, and both passes of materials whose forces are linear in a bond.
 
+use super::LatticeBonds;
 use super::kernel::dispatch;
 use super::linear_kernel::{self, LinearPass, LinearRow, MomentPass, Moments};
-use super::{Bonds, LatticeBonds};
+use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::potential::StretchRange;
+use polycore::numerics::ordered_sum;
 use rayon::prelude::*;
 
 impl<const D: usize> LatticeBonds<D> {
@@ -16,8 +18,7 @@ impl<const D: usize> LatticeBonds<D> {
         let (sites, volume) = (self.sites(), self.lattice().volume);
         let spans = self.spans(displacement);
         let of = |chunk: usize| spans.energy(chunk_range(chunk, sites), &energy);
-        let parts: Vec<f64> = (0..sites.div_ceil(CHUNK)).into_par_iter().map(of).collect();
-        Some(2.0 * volume * volume * parts.iter().sum::<f64>())
+        Some(2.0 * volume * volume * ordered_sum((0..sites.div_ceil(CHUNK)).into_par_iter().map(of)))
     }
 
     /// The stencil for [`Self::moments`] and [`Self::linear_force`].

@@ -5,6 +5,7 @@ mod cells;
 mod cloud;
 mod cloud_kernel;
 mod cloud_linear;
+mod cloud_lists;
 mod kernel;
 mod lattice;
 mod lattice_kernel;
@@ -16,21 +17,24 @@ mod real;
 mod rows;
 mod softening;
 mod stencil;
+mod traits;
 
 pub use crate::geometry::Lattice;
 pub use crate::potential::StretchRange;
-pub use breaking::{Fragment, Overstretched, Seen, components, fingerprint, fragments, overstretched};
+pub use breaking::{Fragment, Overstretched, StretchScan, components, fingerprint, fragments, overstretched};
 pub use cells::CellGrid;
 pub use cloud::CloudBonds;
 pub use cloud_kernel::GROUP;
 pub use cloud_linear::{CloudMoments, CloudPlaces, Columns};
 pub use lattice::LatticeBonds;
 pub use lattice_kernel::TILE;
-pub(crate) use lattice_sums::{GradientSums, Weights};
+pub use lattice_sums::GradientSums;
+pub(crate) use lattice_sums::Weights;
 pub use linear_kernel::{LinearRow, Moments};
 pub use property::Property;
 pub use softening::{Softened, Softening, among};
 pub use stencil::{Stencil, storage};
+pub use traits::{BodyGeometry, BondDamage, BondForces, Bonds, Kind, Neighbour};
 
 #[cfg(feature = "gpu")]
 pub(crate) use rows::{StencilBond, scaled_laws};
@@ -39,153 +43,9 @@ use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::potential::KernelFit;
 use rayon::prelude::*;
-use std::ops::Range;
-
-/// A neighbour J of a particle I, as set-up code sees it.
-#[derive(Clone, Copy, Debug)]
-pub struct Neighbour<const D: usize> {
-    /// Site of J.
-    pub site: usize,
-    /// Number of this bond among those of I, intact or not.
-    pub index: u32,
-    /// Reference bond ξ = X_J − X_I, m.
-    pub bond: [f64; D],
-    /// |ξ|, m.
-    pub length: f64,
-    /// Volume correction times V_J, m³ (without surface correction), of a softened bond times its integrity.
-    pub volume: f64,
-    /// All corrections: volume × surface factor.
-    pub weight: f64,
-    /// θ_J − θ_I of [`Bonds::relief`], m; zero where there is none.
-    pub relief: [f64; D],
-}
-
-/// The two representations, for what only one of them has.
-pub enum Kind<'a, const D: usize> {
-    /// A regular lattice.
-    Lattice(&'a LatticeBonds<D>),
-    /// A cloud.
-    Cloud(&'a CloudBonds<D>),
-}
-
-/// The bonds of a body of dimension `D`: its particles, who is bonded to whom, and the kernels of bond laws. Whatever else acts
-/// along bonds is a [`crate::material::Material`].
-pub trait Bonds<const D: usize>: Send + Sync {
-    /// Storage sites; fields have this length.
-    fn sites(&self) -> usize;
-    /// Sites that hold a particle, ascending.
-    fn particles(&self) -> &[u32];
-    /// Reference position of the particle in a site, m.
-    fn position(&self, site: usize) -> [f64; D];
-    /// Volume of the particle in a site, m³.
-    fn volume(&self, site: usize) -> f64;
-    /// Horizon δ, m.
-    fn horizon(&self) -> f64;
-    /// Distance of neighbouring particles (of a cloud: the cube or square root of the mean volume), m.
-    fn spacing(&self) -> f64;
-    /// Visits the intact bonds of a site.
-    fn neighbours(&self, site: usize, visit: &mut dyn FnMut(Neighbour<D>));
-    /// The intact bond of a site with a [`Neighbour::index`].
-    fn bond(&self, site: usize, index: u32) -> Neighbour<D>;
-    /// Whether an intact bond leads from a site to another.
-    fn is_bonded(&self, site: usize, other: usize) -> bool {
-        let mut bonded = false;
-        self.neighbours(site, &mut |bond| bonded |= bond.site == other);
-        bonded
-    }
-    /// Number of intact bonds of a site.
-    fn bonded(&self, site: usize) -> u32 {
-        let mut count = 0;
-        self.neighbours(site, &mut |_| count += 1);
-        count
-    }
-    /// Whether a site has no intact bond.
-    fn is_alone(&self, site: usize) -> bool {
-        self.bonded(site) == 0
-    }
-    /// The sites of a bond that only the first of them has; `None` where every family is symmetric, as it must be.
-    fn one_sided(&self) -> Option<[usize; 2]> {
-        self.particles().par_iter().find_map_first(|&site| {
-            let mut lone = None;
-            self.neighbours(site as usize, &mut |bond| {
-                if lone.is_none() && !self.is_bonded(bond.site, site as usize) {
-                    lone = Some([site as usize, bond.site]);
-                }
-            });
-            lone
-        })
-    }
-    /// Sets the bond law q(e) and its modulus kθ, N/m⁶.
-    fn set_law(&mut self, fit: &KernelFit, modulus: f64);
-    /// Sets per-particle surface-correction factors (one field of `D` components over the sites).
-    fn set_factors(&mut self, factors: Field<D>);
-    /// Takes in a displacement before [`Bonds::force`] of it, where that reads a copy: in mixed precision
-    /// ([`LatticeBonds::set_mixed`]), and in clouds, where forces without a copy take longer. From the first call on, both give the forces of
-    /// the displacement last taken in.
-    fn round(&mut self, displacement: &Field<D>) {
-        let _ = displacement;
-    }
-    /// Force densities Σ_J f V_J, N/m³, of whole [`Bonds::piece`]s from the site `start` on; collects the stretches observed if
-    /// asked, of every bond in at least one of the work items that hold its ends.
-    fn force(
-        &self,
-        displacement: &Field<D>,
-        start: usize,
-        force: &mut [&mut [f64]; D],
-        track: Option<&mut StretchRange>,
-    );
-    /// Sites that [`Bonds::force`] may begin with: multiples of this, of which a work item is one. The bits of a force may depend on which
-    /// bonds the other sites of its piece have, and on no others.
-    fn piece(&self) -> usize {
-        CHUNK
-    }
-    /// Extremes of e = λ² − 1 over bonds with an end in work item `chunk`; those of all items together are those of the body.
-    fn stretches(&self, displacement: &Field<D>, chunk: usize) -> StretchRange;
-    /// The intact bonds with e > `least`, up to rounding, by site and [`Neighbour::index`]; for all sites together each once from both
-    /// of its ends: what some sites add, whole pieces of one work item.
-    fn suspects(&self, displacement: &Field<D>, sites: Range<usize>, least: f64) -> Vec<[u32; 2]>;
-    /// Severs bonds, each named from both of its ends.
-    fn sever(&mut self, bonds: &[Overstretched]);
-    /// Sets θ of solids of the mean deformation of a family, see [`crate::material::relief`]: before any bond breaks. Lattices have none.
-    fn set_relief(&mut self, relief: Field<D>) {
-        let _ = relief;
-    }
-    /// θ, m, where it is set.
-    fn relief(&self) -> Option<&Field<D>> {
-        None
-    }
-    /// The bonds that bear a part of what they bore.
-    fn softening(&self) -> &Softening;
-    /// Takes these to be the softened bonds, each named from both of its ends: [`Bonds::neighbours`] weighs them by their integrity,
-    /// [`Bonds::force`] does not.
-    fn soften(&mut self, bonds: Vec<Softened>);
-    /// Which bonds are intact, for checkpoints: as many words as [`Bonds::restore`] takes.
-    fn intact(&self) -> Vec<u64>;
-    /// Where [`Bonds::intact`] has the bond of a site with a [`Neighbour::index`]: word and bit.
-    fn bit(&self, site: usize, index: u32) -> (usize, u64);
-    /// Severs what is not intact in `words`; false where their number does not fit these bonds.
-    fn restore(&mut self, words: &[u64]) -> bool;
-    /// Intact bonds, each counted from both ends: the work of one force evaluation.
-    fn directed_bonds(&self) -> u64;
-    /// Bytes this representation holds for bonds and particles.
-    fn bytes(&self) -> usize;
-    /// Which representation this is.
-    fn kind(&self) -> Kind<'_, D>;
-    /// The lattice behind these bonds, if there is one.
-    fn as_lattice(&self) -> Option<&LatticeBonds<D>> {
-        if let Kind::Lattice(lattice) = self.kind() { Some(lattice) } else { None }
-    }
-}
-
-/// Whether a site of a lattice without weights of single bonds has every bond of the stencil: all such families are alike.
-pub(crate) fn has_whole_family<const D: usize>(bonds: &dyn Bonds<D>, site: usize) -> bool {
-    bonds.as_lattice().is_some_and(|lattice| {
-        lattice.is_uniform() && lattice.bonded(site) as usize == lattice.stencil().offsets.len()
-    })
-}
 
 /// Refuses a body in which a bond pulls at one of its ends only: its forces would not sum to zero.
-fn refuse_one_sided<const D: usize>(bonds: &dyn Bonds<D>) -> Result<(), Error> {
+fn refuse_one_sided<const D: usize>(bonds: &dyn BodyGeometry<D>) -> Result<(), Error> {
     let Some(pair) = bonds.one_sided() else { return Ok(()) };
     let [here, there] = pair.map(|site| bonds.position(site));
     Err(Error::geometry(format!("the bond from {here:?} to {there:?} m has no counterpart")))
@@ -193,7 +53,7 @@ fn refuse_one_sided<const D: usize>(bonds: &dyn Bonds<D>) -> Result<(), Error> {
 
 /// What is not finite in a site, and when: for errors.
 pub(crate) fn not_finite<const D: usize>(
-    bonds: &dyn Bonds<D>,
+    bonds: &dyn BodyGeometry<D>,
     quantity: &'static str,
     site: usize,
     step: usize,
@@ -204,7 +64,11 @@ pub(crate) fn not_finite<const D: usize>(
 }
 
 /// Force densities of the whole body, N/m³.
-pub fn force<const D: usize, B: Bonds<D> + ?Sized>(bonds: &B, displacement: &Field<D>, force: &mut Field<D>) {
+pub fn force<const D: usize, B: BondForces<D> + ?Sized>(
+    bonds: &B,
+    displacement: &Field<D>,
+    force: &mut Field<D>,
+) {
     let sites = bonds.sites();
     force.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, mut out)| {
         debug_assert_eq!(chunk_range(chunk, sites).len(), out[0].len());
@@ -213,7 +77,7 @@ pub fn force<const D: usize, B: Bonds<D> + ?Sized>(bonds: &B, displacement: &Fie
 }
 
 /// Extremes of e = λ² − 1 over all intact bonds.
-pub fn stretch_range<const D: usize, B: Bonds<D> + ?Sized>(
+pub fn stretch_range<const D: usize, B: BondForces<D> + ?Sized>(
     bonds: &B,
     displacement: &Field<D>,
 ) -> StretchRange {
@@ -225,14 +89,14 @@ pub fn stretch_range<const D: usize, B: Bonds<D> + ?Sized>(
 }
 
 /// The stretches [λ_low, λ_high] of the bonds in a displacement, with a margin for rounding: the range of a fitted law.
-pub fn covered_stretches<const D: usize>(bonds: &dyn Bonds<D>, displacement: &Field<D>) -> [f64; 2] {
+pub fn covered_stretches<const D: usize>(bonds: &dyn BondForces<D>, displacement: &Field<D>) -> [f64; 2] {
     let range = stretch_range(bonds, displacement);
     [(1.0 + range.low).max(0.0).sqrt() - 1e-3, (1.0 + range.high).sqrt() + 1e-3].map(|s| s.max(1e-3))
 }
 
 /// The plain loop over bonds, for laws that only a table represents.
 fn plain_force<const D: usize>(
-    bonds: &dyn Bonds<D>,
+    bonds: &dyn BodyGeometry<D>,
     fit: &KernelFit,
     modulus: f64,
     displacement: &Field<D>,

@@ -1,6 +1,6 @@
 //! Properties as fields over the particles.
 
-use super::Bonds;
+use super::BodyGeometry;
 
 /// A property of the particles: one value for all, which costs nothing, or a value for each site. A number is one: `3.0.into()`.
 /// Bonds may be weaker than both of their ends.
@@ -22,7 +22,7 @@ impl From<f64> for Property {
 
 impl Property {
     /// A field: `value` of the site and the position, m, of each particle.
-    pub fn new<const D: usize>(bonds: &dyn Bonds<D>, value: impl Fn(usize, [f64; D]) -> f64) -> Self {
+    pub fn new<const D: usize>(bonds: &dyn BodyGeometry<D>, value: impl Fn(usize, [f64; D]) -> f64) -> Self {
         let mut field = Self {
             values: vec![0.0; bonds.sites()],
             least: f64::INFINITY,

@@ -8,7 +8,7 @@
 //! r_f = 0. On a staircase, where Σ_I w_fI X_I lies beside X_f as well, the weights gain a term, linear across N_f, that brings it below
 //! X_f. No place depends on a rotation, so that forces have an energy and conserve momentum and angular momentum.
 
-use crate::bonds::{Bonds, CellGrid};
+use crate::bonds::{BodyGeometry, Bonds, CellGrid};
 use crate::field::Field;
 use crate::material::{Tensor, surface_load};
 use crate::surface::{Face, Surface};
@@ -188,7 +188,7 @@ impl<const D: usize> Faces<D> {
 
     /// max_f Σ_g √(A_f A_g)|Σ_I w_fI w_gI/V_I|, m⁻¹: that times the stiffness of a plane over its area, Pa/m, bounds the greatest
     /// eigenvalue that faces in touch add to the stiffness over volumes, N/m⁴ (Gershgorin over faces).
-    pub fn greatest(&self, bonds: &dyn Bonds<D>) -> f64 {
+    pub fn greatest(&self, bonds: &dyn BodyGeometry<D>) -> f64 {
         let row = |face: usize| {
             let mut products: Vec<(u32, f64)> = Vec::new();
             for (site, weight) in self.below(face) {
@@ -227,13 +227,13 @@ impl<const D: usize> Faces<D> {
 }
 
 /// Area of the side of a particle, m²: its volume over the spacing.
-pub fn typical_area<const D: usize>(bonds: &dyn Bonds<D>) -> f64 {
+pub fn typical_area<const D: usize>(bonds: &dyn BodyGeometry<D>) -> f64 {
     let volumes: f64 = bonds.particles().iter().map(|&site| bonds.volume(site as usize)).sum();
     volumes / bonds.particles().len().max(1) as f64 / bonds.spacing()
 }
 
 /// All particles below faces, each nearer to its face than to an opposite one; hats add up to 1 over the faces of a patch.
-fn below<const D: usize>(bonds: &dyn Bonds<D>, surface: &Surface<D>) -> Vec<Below> {
+fn below<const D: usize>(bonds: &dyn BodyGeometry<D>, surface: &Surface<D>) -> Vec<Below> {
     let (faces, spacing) = (surface.faces(), bonds.spacing());
     if faces.is_empty() {
         return Vec::new();
@@ -315,7 +315,7 @@ fn join_small<const D: usize>(
 
 /// Adds to weights the term, linear across the normal of the face, with which Σ w X lies below it; how far below, m.
 fn centre<const D: usize>(
-    bonds: &dyn Bonds<D>,
+    bonds: &dyn BodyGeometry<D>,
     face: &Face<D>,
     group: &[Below],
     weights: &mut [f64],

@@ -2,7 +2,7 @@
 
 use super::Contact;
 use super::grip::{Grip, Pair};
-use crate::bonds::Bonds;
+use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field, chunk_range};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -33,7 +33,7 @@ impl<const D: usize> Contact<D> {
     /// begun to touch since `start` slips for the rest of its way only.
     pub fn grips(
         &self,
-        bonds: &dyn Bonds<D>,
+        bonds: &dyn BodyGeometry<D>,
         displacement: &Field<D>,
         start: &Field<D>,
         old: &[Grip],
@@ -141,7 +141,7 @@ impl<const D: usize> Contact<D> {
     /// present normal forces. Takes effect in [`Self::add_friction`].
     pub fn slide_on(
         &mut self,
-        bonds: &dyn Bonds<D>,
+        bonds: &dyn BodyGeometry<D>,
         displacement: &Field<D>,
         velocity: &Field<D>,
         step: f64,

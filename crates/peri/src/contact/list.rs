@@ -1,7 +1,7 @@
 //! Which particles without a bond are near each other, and how near.
 
 use super::vicinity::Vicinity;
-use crate::bonds::{Bonds, CellGrid};
+use crate::bonds::{BodyGeometry, CellGrid};
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::geometry::length;
 use rayon::prelude::*;
@@ -90,7 +90,7 @@ impl<const D: usize> Near<D> {
 
 impl<const D: usize> List<D> {
     /// Of the undeformed body.
-    pub fn new(bonds: &dyn Bonds<D>, gap: f64) -> Self {
+    pub fn new(bonds: &dyn BodyGeometry<D>, gap: f64) -> Self {
         let volumes: Vec<f64> = bonds.particles().iter().map(|&site| bonds.volume(site as usize)).collect();
         let mean = volumes.iter().sum::<f64>() / volumes.len() as f64;
         let alike = volumes.iter().all(|&volume| volume == volumes[0]);
@@ -129,7 +129,7 @@ impl<const D: usize> List<D> {
     }
 
     /// Rebuilds the list where pairs that it lacks may have come near since it was made.
-    pub fn update(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>) {
+    pub fn update(&mut self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) {
         if !self.vicinity.as_mut().is_some_and(|vicinity| vicinity.holds(bonds.particles(), displacement)) {
             self.rebuild(bonds, displacement);
         }
@@ -137,7 +137,7 @@ impl<const D: usize> List<D> {
 
     /// Takes in the pairs of sites whose bonds have just broken, each from both of its ends: the list is then that which would
     /// have been made of the bonds that are left.
-    pub fn part(&mut self, bonds: &dyn Bonds<D>, pairs: &[[u32; 2]]) {
+    pub fn part(&mut self, bonds: &dyn BodyGeometry<D>, pairs: &[[u32; 2]]) {
         // else the next update makes it anew
         let Some(vicinity) = &self.vicinity else { return };
         let reach = self.gap + self.skin;
@@ -182,7 +182,7 @@ impl<const D: usize> List<D> {
     }
 
     /// Makes the list for a displacement.
-    pub fn rebuild(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>) {
+    pub fn rebuild(&mut self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) {
         // frees its memory first
         self.vicinity = None;
         let particles = bonds.particles();
@@ -280,7 +280,7 @@ impl<const D: usize> List<D> {
     /// The particles of `sites` that others are near to, each with those at r < d + `gap`, up to the gap of the list.
     pub fn pairs<'a>(
         &'a self,
-        bonds: &'a dyn Bonds<D>,
+        bonds: &'a dyn BodyGeometry<D>,
         displacement: &'a Field<D>,
         sites: Range<usize>,
         gap: f64,

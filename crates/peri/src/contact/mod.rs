@@ -35,14 +35,14 @@ mod stiffness;
 mod ties;
 mod vicinity;
 
-use crate::bonds::{Bonds, LatticeBonds, Property};
+use crate::bonds::{BodyGeometry, Bonds, LatticeBonds, Property};
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::surface::Surface;
 pub use friction::Sliding;
 pub use grip::{Drag, Grip, Pair};
 use list::{List, Listed, Near};
-pub use plane::{Plane, Resting};
+pub use plane::{Plane, PlaneReaction};
 use planes::Planes;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -85,7 +85,7 @@ pub struct Contact<const D: usize> {
 
 /// Bodies and planes in touch.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Touching {
+pub struct ContactSummary {
     /// Pairs with r < d, and faces that touch a plane.
     pub pairs: u64,
     /// Greatest overlap: 1 − r/d of a pair, over half a spacing of a face; 0 where nothing touches.
@@ -108,7 +108,11 @@ impl<const D: usize> Contact<D> {
     ///
     /// # Errors
     /// [`Error::Parameter`] where s is negative, M is not positive, or either is not finite.
-    pub fn new(bonds: &dyn Bonds<D>, modulus: impl Into<Property>, stiffness: f64) -> Result<Self, Error> {
+    pub fn new(
+        bonds: &dyn BodyGeometry<D>,
+        modulus: impl Into<Property>,
+        stiffness: f64,
+    ) -> Result<Self, Error> {
         let modulus = modulus.into();
         positive("modulus of contact", modulus.least())?;
         positive("modulus of contact", modulus.greatest())?;
@@ -126,7 +130,7 @@ impl<const D: usize> Contact<D> {
     ///
     /// # Errors
     /// [`Error::Parameter`] where κ is negative, kθ is not positive, or either is not finite.
-    pub fn short_range(bonds: &dyn Bonds<D>, modulus: f64, stiffness: f64) -> Result<Self, Error> {
+    pub fn short_range(bonds: &dyn BodyGeometry<D>, modulus: f64, stiffness: f64) -> Result<Self, Error> {
         positive("modulus of contact", modulus)?;
         let unit = 6.0 * modulus / bonds.horizon();
         // the same bits as κ·6kθ/δ
@@ -135,7 +139,7 @@ impl<const D: usize> Contact<D> {
         Ok(contact)
     }
 
-    fn of_pairs(bonds: &dyn Bonds<D>, unit: f64, stiffness: f64) -> Result<Self, Error> {
+    fn of_pairs(bonds: &dyn BodyGeometry<D>, unit: f64, stiffness: f64) -> Result<Self, Error> {
         non_negative("contact.stiffness", stiffness)?;
         let volumes = bonds.particles().iter().map(|&site| bonds.volume(site as usize));
         let near = NEAR * bonds.spacing();
@@ -266,7 +270,7 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Force, area and width of the contact with each plane, without friction.
-    pub fn resting(&self, displacement: &Field<D>) -> Vec<Resting> {
+    pub fn resting(&self, displacement: &Field<D>) -> Vec<PlaneReaction> {
         self.planes.as_ref().map_or_else(Vec::new, |planes| planes.resting(displacement))
     }
 
@@ -291,7 +295,7 @@ impl<const D: usize> Contact<D> {
 
     /// Prepares the forces of a displacement: rebuilds the list where particles near each other may have moved against each other by the
     /// skin since it was made, and computes the forces of planes.
-    pub fn update(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>) {
+    pub fn update(&mut self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) {
         if self.has_pairs() {
             self.list.update(bonds, displacement);
         }
@@ -304,7 +308,7 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Takes in the pairs of sites whose bonds have just broken, each from both of its ends.
-    pub fn part(&mut self, bonds: &dyn Bonds<D>, pairs: &[[u32; 2]]) {
+    pub fn part(&mut self, bonds: &dyn BodyGeometry<D>, pairs: &[[u32; 2]]) {
         if self.has_pairs() {
             self.list.part(bonds, pairs);
         }
@@ -314,7 +318,7 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Makes the list for a displacement; to be called where bonds have changed, otherwise than by [`Self::part`].
-    pub fn rebuild(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>) {
+    pub fn rebuild(&mut self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) {
         self.list.rebuild(bonds, displacement);
         if let Some(planes) = &mut self.planes {
             planes.lose(bonds, bonds.particles().iter().map(|&site| site as usize));
@@ -331,7 +335,7 @@ impl<const D: usize> Contact<D> {
     /// Of `sites`, the particles with those at r < d + `gap` from them; none where particles do not repel each other.
     fn pairs<'a>(
         &'a self,
-        bonds: &'a dyn Bonds<D>,
+        bonds: &'a dyn BodyGeometry<D>,
         displacement: &'a Field<D>,
         sites: Range<usize>,
         gap: f64,
@@ -342,7 +346,7 @@ impl<const D: usize> Contact<D> {
     /// Adds the force densities of pairs, −Σ_J k(d − r) V_J ζ/r, of planes, and of friction between equilibria, N/m³, on the particles from the site `start` on, of one work item.
     pub fn force(
         &self,
-        bonds: &dyn Bonds<D>,
+        bonds: &dyn BodyGeometry<D>,
         displacement: &Field<D>,
         start: usize,
         force: &mut [&mut [f64]; D],
@@ -373,7 +377,7 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Greatest overlap 1 − r/d of pairs whose stiffness is that of the material, with their distance d, m.
-    pub fn deepest_pair(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>) -> Option<[f64; 2]> {
+    pub fn deepest_pair(&self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) -> Option<[f64; 2]> {
         if !self.layered {
             return None;
         }
@@ -389,8 +393,8 @@ impl<const D: usize> Contact<D> {
     }
 
     /// What touches.
-    pub fn touching(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>) -> Touching {
-        let none = Touching { pairs: 0, overlap: 0.0, energy: 0.0 };
+    pub fn touching(&self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) -> ContactSummary {
+        let none = ContactSummary { pairs: 0, overlap: 0.0, energy: 0.0 };
         let of = |chunk: usize| {
             let (mut part, sites) = (none, chunk_range(chunk, displacement.sites()));
             for (own, touching) in self.list.pairs(bonds, displacement, sites, 0.0) {
@@ -406,9 +410,9 @@ impl<const D: usize> Contact<D> {
             }
             part
         };
-        let parts: Vec<Touching> =
+        let parts: Vec<ContactSummary> =
             (0..displacement.sites().div_ceil(CHUNK)).into_par_iter().map(of).collect();
-        let mut all = parts.into_iter().fold(none, |a, b| Touching {
+        let mut all = parts.into_iter().fold(none, |a, b| ContactSummary {
             pairs: a.pairs + b.pairs,
             overlap: a.overlap.max(b.overlap),
             energy: a.energy + b.energy,

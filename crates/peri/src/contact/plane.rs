@@ -79,7 +79,7 @@ impl<const D: usize> Plane<D> {
 
 /// Contact of a body with a plane.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Resting {
+pub struct PlaneReaction {
     /// Force of the plane on the body, N.
     pub force: [f64; 3],
     /// Area of the faces in touch, m².

@@ -2,8 +2,8 @@
 
 use super::faces::Faces;
 use super::grip::{Grip, Pair};
-use super::plane::{Plane, Resting};
-use crate::bonds::{Bonds, Property};
+use super::plane::{Plane, PlaneReaction};
+use crate::bonds::{BodyGeometry, Bonds, Property};
 use crate::error::Error;
 use crate::field::Field;
 use crate::geometry::length;
@@ -159,7 +159,7 @@ impl<const D: usize> Planes<D> {
     }
 
     /// Takes in the particles among `sites` that have lost bonds: they touch planes themselves, and faces above them no longer do.
-    pub fn lose(&mut self, bonds: &dyn Bonds<D>, sites: impl Iterator<Item = usize>) {
+    pub fn lose(&mut self, bonds: &dyn BodyGeometry<D>, sites: impl Iterator<Item = usize>) {
         let before = self.bare.len();
         for site in sites.filter(|&site| bonds.bonded(site) < self.bonded[site]) {
             self.bare.push(site as u32);
@@ -339,10 +339,10 @@ impl<const D: usize> Planes<D> {
     }
 
     /// Force, area and width of the contact with each plane, without friction.
-    pub fn resting(&self, field: &Field<D>) -> Vec<Resting> {
+    pub fn resting(&self, field: &Field<D>) -> Vec<PlaneReaction> {
         let of = |placed: &Placed<D>| {
             let normal = placed.plane.normal;
-            let mut resting = Resting { gap: f64::INFINITY, ..Resting::default() };
+            let mut resting = PlaneReaction { gap: f64::INFINITY, ..PlaneReaction::default() };
             let (mut push, mut first, mut second) = (0.0, [0.0; D], [0.0; D]);
             let (mut low, mut high, mut count) = ([f64::INFINITY; D], [f64::NEG_INFINITY; D], 0.0);
             for touch in self.touches(placed, field) {

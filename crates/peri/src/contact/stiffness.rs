@@ -4,7 +4,7 @@ use super::Contact;
 use super::list::{Listed, Near};
 use super::planes::Planes;
 use super::ties::Ties;
-use crate::bonds::Bonds;
+use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field, chunk_range};
 use rayon::prelude::*;
 
@@ -14,7 +14,7 @@ pub type Spring<'a, const D: usize> = dyn FnMut(&[(usize, f64)], Option<[f64; D]
 impl<const D: usize> Contact<D> {
     /// max_I Σ_J k V_J over what touches, with half of what planes add, N/m⁴: twice that over the density bounds what contact adds to
     /// the squared greatest frequency.
-    pub fn greatest_stiffness(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>) -> f64 {
+    pub fn greatest_stiffness(&self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) -> f64 {
         let sites = displacement.sites();
         let of = |chunk: usize| {
             let pairs = self.pairs(bonds, displacement, chunk_range(chunk, sites), 0.0);
@@ -44,7 +44,7 @@ impl<const D: usize> Contact<D> {
     /// it starts each step from rest, see [`Contact::still`], and so must not go farther than a gradient step may.
     pub fn add_stiffness(
         &self,
-        bonds: &dyn Bonds<D>,
+        bonds: &dyn BodyGeometry<D>,
         displacement: &Field<D>,
         tangent: f64,
         masses: &mut [f64],
@@ -61,7 +61,13 @@ impl<const D: usize> Contact<D> {
     }
 
     /// As [`Self::add_stiffness`], of pairs alone.
-    pub fn add_pairs(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>, tangent: f64, masses: &mut [f64]) {
+    pub fn add_pairs(
+        &self,
+        bonds: &dyn BodyGeometry<D>,
+        displacement: &Field<D>,
+        tangent: f64,
+        masses: &mut [f64],
+    ) {
         let of = |own: u32, Near { site, zeta, r, .. }: Near<D>| {
             let unit = zeta.map(|x| x / r.max(f64::MIN_POSITIVE));
             // friction holds in all directions
@@ -103,7 +109,12 @@ impl<const D: usize> Contact<D> {
 
     /// How far a step along a direction may go so that none leaps past another: by a quarter of a spacing against each
     /// other where they touch or are about to, by half of one at all. ∞ along a direction of zeros.
-    pub fn longest_step(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>, direction: &Field<D>) -> f64 {
+    pub fn longest_step(
+        &self,
+        bonds: &dyn BodyGeometry<D>,
+        displacement: &Field<D>,
+        direction: &Field<D>,
+    ) -> f64 {
         if !self.has_pairs() {
             // nothing leaps past a plane
             return f64::INFINITY;

@@ -5,12 +5,12 @@
 //! with U extrapolated linearly from the two held particles behind it, has no such layer.
 
 use super::faces::Faces;
-use crate::bonds::{Bonds, LatticeBonds, Overstretched};
+use crate::bonds::{BodyGeometry, LatticeBonds, Overstretched};
 use crate::field::Field;
 use crate::surface::{Face, Surface};
 
 /// Bonds between held particles and others, each from both ends.
-pub fn across<const D: usize>(bonds: &dyn Bonds<D>, held: &[bool]) -> Vec<Overstretched> {
+pub fn across<const D: usize>(bonds: &dyn BodyGeometry<D>, held: &[bool]) -> Vec<Overstretched> {
     let mut list = Vec::new();
     for &site in bonds.particles() {
         bonds.neighbours(site as usize, &mut |bond| {

@@ -2,6 +2,7 @@
 
 use crate::bonds::CellGrid;
 use crate::field::{CHUNK, Field, chunk_range};
+use polycore::numerics::bounds;
 use rayon::prelude::*;
 
 /// Cells within this many of each other are compared one by one, those farther apart all at once.
@@ -90,9 +91,7 @@ impl<const D: usize> Vicinity<D> {
             left
         };
         let near = (0..moves.len()).into_par_iter().map(left).reduce(|| f64::INFINITY, f64::min);
-        let all = moves.iter().fold([[f64::INFINITY; D], [f64::NEG_INFINITY; D]], |[low, high], [l, h]| {
-            [std::array::from_fn(|d| low[d].min(l[d])), std::array::from_fn(|d| high[d].max(h[d]))]
-        });
+        let all = bounds(moves.iter().flatten().copied());
         let left = near.min(allowed(RINGS + 1) - against(&all, &all));
         let known = moves.iter().flatten().flatten().all(|moved| moved.is_finite());
         if known { left } else { f64::NEG_INFINITY }

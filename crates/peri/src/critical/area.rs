@@ -8,7 +8,7 @@ use rayon::prelude::*;
 pub struct CrackArea {
     /// Σ_J w V_J |ξ_e|/|ξ| over short bonds, m³.
     short: f64,
-    /// Intact bonds of a lattice, see [`Bonds::intact`].
+    /// Intact bonds of a lattice, see [`crate::bonds::BondDamage::intact`].
     words: Vec<u64>,
     /// Short bonds of a cloud.
     pairs: Vec<[u32; 2]>,

@@ -1,6 +1,6 @@
 //! Bonds across a cut through a body, and the energy that a crack takes where it breaks them.
 
-use crate::bonds::{Bonds, surface_weight};
+use crate::bonds::{BodyGeometry, surface_weight};
 use crate::field::Field;
 use rayon::prelude::*;
 use serde::Deserialize;
@@ -68,7 +68,7 @@ struct Sums<const D: usize> {
 
 impl<const D: usize> Sums<D> {
     /// Those of the particle in a site, whose neighbours have its own surface factors.
-    fn of(bonds: &dyn Bonds<D>, surface: Option<&Field<D>>, site: usize) -> Self {
+    fn of(bonds: &dyn BodyGeometry<D>, surface: Option<&Field<D>>, site: usize) -> Self {
         let mut sums = Self { reach: [0.0; D], short: [0.0; D], bonds: 0.0 };
         let short = SHORT * bonds.spacing();
         let factors = surface.map(|field| field.get(site));
@@ -88,17 +88,11 @@ impl<const D: usize> Sums<D> {
 impl Crossing {
     /// Of one particle with a whole family on a lattice, of the mean over such particles in a cloud, before the bonds have factors of
     /// their own; `surface` are those of the surface correction.
-    pub fn new<const D: usize>(bonds: &dyn Bonds<D>, surface: Option<&Field<D>>) -> Self {
-        let inner = match bonds.as_lattice() {
-            Some(lattice) => {
-                let all = lattice.stencil().offsets.len();
-                bonds
-                    .particles()
-                    .iter()
-                    .copied()
-                    .find(|&site| bonds.bonded(site as usize) as usize == all)
-                    .into_iter()
-                    .collect()
+    pub fn new<const D: usize>(bonds: &dyn BodyGeometry<D>, surface: Option<&Field<D>>) -> Self {
+        let inner = match bonds.whole_family() {
+            Some(all) => {
+                let whole = |&site: &u32| bonds.bonded(site as usize) == all;
+                bonds.particles().iter().copied().find(whole).into_iter().collect()
             }
             None => inside(bonds),
         };
@@ -132,7 +126,7 @@ impl Crossing {
 }
 
 /// Particles of a cloud with whole families: neither they nor their neighbours are at a surface.
-fn inside<const D: usize>(bonds: &dyn Bonds<D>) -> Vec<u32> {
+fn inside<const D: usize>(bonds: &dyn BodyGeometry<D>) -> Vec<u32> {
     let off = |&site: &u32| {
         let (mut sum, mut first) = (0.0, [0.0; D]);
         bonds.neighbours(site as usize, &mut |bond| {

@@ -2,7 +2,7 @@
 
 use super::kernels::{Form, HEAD, leap, pull};
 use super::{Device, Precision};
-use crate::bonds::{Bonds, LatticeBonds, StencilBond, not_finite, scaled_laws};
+use crate::bonds::{BodyGeometry, BondDamage, LatticeBonds, StencilBond, not_finite, scaled_laws};
 use crate::error::Error;
 use crate::field::Field;
 use crate::potential::KernelFit;
@@ -66,7 +66,7 @@ pub struct DeviceBody<'a, const D: usize> {
 
 impl<'a, const D: usize> DeviceBody<'a, D> {
     /// Puts particles, intact bonds and a law q(e) with its modulus kθ, N/m⁶, on a device. Bonds beyond the stretch `critical`
-    /// break; law and stretches are those of [`crate::bonds::Bonds::set_law`] and [`crate::bonds::overstretched`].
+    /// break; law and stretches are those of [`crate::bonds::BondForces::set_law`] and [`crate::bonds::overstretched`].
     ///
     /// # Errors
     /// [`Error::Device`] for what the kernels do not know, and for a body that the device's memory does not hold;
@@ -195,7 +195,7 @@ impl<'a, const D: usize> DeviceBody<'a, D> {
         Ok(motion)
     }
 
-    /// Which bonds are intact, as [`Bonds::restore`] takes it.
+    /// Which bonds are intact, as [`crate::bonds::BondDamage::restore`] takes it.
     ///
     /// # Errors
     /// [`Error::Device`] where the device fails.

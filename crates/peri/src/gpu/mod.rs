@@ -6,7 +6,7 @@
 //! spacings a step, so that nothing leaves the range of single precision; stretches come from differences of displacements.
 //!
 //! ```no_run
-//! # use peri::{Error, bonds::{Bonds, LatticeBonds}, field::Field, potential::KernelFit};
+//! # use peri::{Error, bonds::{BodyGeometry, BondDamage, BondForces, LatticeBonds}, field::Field, potential::KernelFit};
 //! use peri::gpu::{Device, DeviceBody, Start};
 //! # fn run(mut bonds: LatticeBonds<3>, law: &KernelFit, modulus: f64, start: &Start<3>) -> Result<(), Error> {
 //! let device = Device::portable()?;

@@ -1,10 +1,11 @@
 //! Rubber as the full network: a Langevin chain along every bond, and a pressure that keeps the volume.
 
-use super::deformation::{GRADIENT, LEAST_SHAPE};
-use super::eight_chain::{LINEAR, cofactor, logarithm, logarithm_slopes};
-use super::tensor::{Tensor, invert};
+use super::crushed::{logarithm, logarithm_slopes};
+use super::eight_chain::LINEAR;
+use super::point::{GRADIENT, LEAST_SHAPE};
+use super::tensor::{Tensor, cofactor, invert};
 use super::{Bond, Family, Material};
-use crate::bonds::Bonds;
+use crate::bonds::BodyGeometry;
 use crate::calibrate::modulus_in;
 use crate::error::Error;
 use polycore::langevin;
@@ -219,7 +220,7 @@ impl Material<3> for Affine {
         springs + most
     }
 
-    fn micromodulus(&self, bonds: &dyn Bonds<3>) -> f64 {
+    fn micromodulus(&self, bonds: &dyn BodyGeometry<3>) -> f64 {
         modulus_in(bonds, 3.0 * self.shear)
     }
 

@@ -1,13 +1,14 @@
 //! Bond laws as materials: no state of a particle, forces by the kernels of [`crate::bonds`].
 
 use super::softened::{Lacking, lacking_energy};
-use super::{Bond, Cover, Family, LawRange, Material, Response};
-use crate::bonds::{Bonds, LatticeBonds, Overstretched, Property};
+use super::{Bond, Family, LawCover, LawRange, Material, Response};
+use crate::bonds::{BodyGeometry, Bonds, Overstretched, Property};
 use crate::error::Error;
 use crate::field::{CHUNK, Field};
 use crate::potential::{
     BondPotential, EnergyTable, KernelFit, StretchRange, TangentTable, integrity, softened_energy,
 };
+use polycore::numerics::ordered_sum;
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -86,7 +87,7 @@ impl<const D: usize> Material<D> for BondMaterial<'_> {
             })
     }
 
-    fn micromodulus(&self, _bonds: &dyn Bonds<D>) -> f64 {
+    fn micromodulus(&self, _bonds: &dyn BodyGeometry<D>) -> f64 {
         self.modulus * self.law.tangent() / 3.0
     }
 
@@ -129,7 +130,7 @@ impl<const D: usize> Response<D> for Kernels<'_> {
         &mut self,
         bonds: &mut dyn Bonds<D>,
         _displacement: &Field<D>,
-        cover: &Cover,
+        cover: &LawCover,
     ) -> Result<f64, Error> {
         let (law, modulus) = (&*self.material.law, self.material.modulus);
         let mut fit = KernelFit::new(law, cover.stretches, cover.bound)?;
@@ -186,9 +187,7 @@ impl<const D: usize> Response<D> for Kernels<'_> {
             .end
             .as_ref()
             .map(|end| modulus * lacking_energy(&self.material, end, table, bonds, displacement));
-        if let Some(sum) =
-            bonds.as_lattice().and_then(|lattice| lattice.energy(displacement, |e| table.value(e)))
-        {
+        if let Some(sum) = bonds.energy_sum(displacement, table) {
             return modulus * sum + lacking.unwrap_or(0.0);
         }
         let of = |sites: &[u32]| {
@@ -209,8 +208,7 @@ impl<const D: usize> Response<D> for Kernels<'_> {
             }
             sum
         };
-        let parts: Vec<f64> = bonds.particles().par_chunks(CHUNK).map(of).collect();
-        modulus * parts.iter().sum::<f64>() + lacking.unwrap_or(0.0)
+        modulus * ordered_sum(bonds.particles().par_chunks(CHUNK).map(of)) + lacking.unwrap_or(0.0)
     }
 
     /// Half of a bond's energy 2kθ|ξ|φ w V_I V_J from either end. Beyond what is fitted q is constant: the energy grows with half
@@ -255,11 +253,9 @@ impl<const D: usize> Response<D> for Kernels<'_> {
         // a bond past its greatest force is soft, but a light particle would leap when it meets a stiff one
         let least = LEAST_TANGENT * law.tangent().abs();
         let sites = bonds.sites();
-        let on_lattice = |lattice: &LatticeBonds<D>| -> Option<Vec<Vec<f64>>> {
-            let chunk = |chunk| lattice.stiffness(displacement, chunk, table, least);
-            (0..sites.div_ceil(CHUNK)).into_par_iter().map(chunk).collect()
-        };
-        if let Some(sums) = bonds.as_lattice().and_then(on_lattice) {
+        let chunk = |chunk| bonds.stiffness_sums(displacement, chunk, table, least);
+        let sums: Option<Vec<Vec<f64>>> = (0..sites.div_ceil(CHUNK)).into_par_iter().map(chunk).collect();
+        if let Some(sums) = sums {
             let sums = sums.concat();
             return bonds.particles().iter().map(|&site| sums[site as usize]).collect();
         }

@@ -1,11 +1,14 @@
 //! Both passes of a solid on a cloud, by the kernels of [`crate::bonds`].
 
-use super::deformation::{NonlocalSolid, Point, PointLaw};
-use super::family::{Bond, Family};
+use super::family::Bond;
+use super::point::Point;
+use super::point_law::{NonlocalSolid, PointLaw};
 use super::pointwise::Passes;
 use super::solid_passes::Families;
 use super::tensor::Tensor;
-use crate::bonds::{Bonds, CloudBonds, CloudPlaces, Columns, Kind, Softened, StretchRange, among};
+use crate::bonds::{
+    BodyGeometry, BondDamage, Bonds, CloudBonds, CloudPlaces, Columns, Kind, Softened, StretchRange, among,
+};
 use crate::field::{CHUNK, Field, chunk_range};
 use rayon::prelude::*;
 
@@ -41,7 +44,7 @@ impl<L: PointLaw<D>, const D: usize> Passes<NonlocalSolid<L>, D> for CloudPasses
         points: &mut [Point<D>],
     ) {
         let Kind::Cloud(cloud) = bonds.kind() else { return };
-        let (changed, softer) = self.families.changes(bonds);
+        let changes = self.families.changes(bonds);
         let softening = cloud.softening();
         self.places.load(displacement);
         let (places, stride) = (&self.places, self.places.stride());
@@ -50,13 +53,7 @@ impl<L: PointLaw<D>, const D: usize> Passes<NonlocalSolid<L>, D> for CloudPasses
         let springs = items.map(|(chunk, ((terms, bonded), points))| {
             let (mut springs, first) = (false, chunk * CHUNK);
             let soft = softening.among(chunk_range(chunk, cloud.sites()));
-            for at in (0..bonded.len()).filter(|_| changed) {
-                let (site, now) = (first + at, cloud.bonded(first + at));
-                if bonded[at] != now || softer && !among(soft, site..site + 1).is_empty() {
-                    bonded[at] = now;
-                    points[at].reshape(&Family::new(bonds, displacement, site));
-                }
-            }
+            changes.reshape(&solid.0, (bonds, displacement), (first, soft), bonded, points);
             cloud.moments(places, chunk, &mut |site, moments| {
                 let (at, point) = (site - first, &mut points[site - first]);
                 if point.has_gradient() {
@@ -70,10 +67,10 @@ impl<L: PointLaw<D>, const D: usize> Passes<NonlocalSolid<L>, D> for CloudPasses
                         moment += Tensor::from_fn(|a, b| lack * bond.change[a] * bond.reference[b]);
                         shifted += Tensor::from_fn(|a, b| lack * bond.change[a] * bond.relief[b]);
                     }
-                    solid.deform(point, moment, shifted, square);
-                    solid.answer(point);
+                    point.deform(moment, shifted, square);
+                    point.answer(&solid.0);
                 } else {
-                    solid.spring(point);
+                    point.spring(&solid.0);
                     springs |= bonded[at] > 0;
                 }
                 let terms = &mut terms[stride * at..stride * (at + 1)];

@@ -1,6 +1,6 @@
 //! Any constitutive law C → (W, S, ℂ) as the law of a family's mean deformation.
 
-use super::deformation::{Deformation, PointLaw, PointStress};
+use super::point_law::{Deformation, PointLaw, PointStress};
 use super::tensor::{Tensor, embed};
 use crate::calibrate::Space;
 use crate::error::Error;

@@ -1,7 +1,8 @@
 //! Rubber as a network of Langevin chains whose volume is kept by a pressure.
 
-use super::deformation::{Deformation, PointLaw, PointStress};
-use super::tensor::{Tensor, embed};
+use super::crushed::{CRUSHED, inverse_square, logarithm, logarithm_slopes};
+use super::point_law::{Deformation, PointLaw, PointStress};
+use super::tensor::cofactor;
 use crate::calibrate::Space;
 use crate::error::Error;
 use crate::quadrature::mean;
@@ -28,9 +29,6 @@ pub struct EightChain<const D: usize> {
 
 /// Relative extension beyond which β grows linearly: a chain that a load step stretches too far has a force nevertheless.
 pub(super) const LINEAR: f64 = 0.995;
-/// J below which ln J and J⁻² go on as parabolas.
-pub(super) const CRUSHED: f64 = 0.2;
-
 /// Excess of I₁ below which the energy is an integral of μ, which does not cancel.
 const SMALL: f64 = 0.05;
 
@@ -216,44 +214,6 @@ struct Thickness {
     change: f64,
     /// λ₃², and of an incompressible sheet its derivatives by J.
     square: [f64; 3],
-}
-
-/// ln J at J = 1 + `change`, a parabola below [`CRUSHED`].
-pub(super) fn logarithm(change: f64) -> f64 {
-    let (s, r) = (1.0 + change - CRUSHED, 1.0 / CRUSHED);
-    if s > 0.0 { change.ln_1p() } else { CRUSHED.ln() + s * r - 0.5 * s * s * r * r }
-}
-
-/// Its derivatives.
-pub(super) fn logarithm_slopes(change: f64) -> [f64; 2] {
-    let (jacobian, r) = (1.0 + change, 1.0 / CRUSHED);
-    if jacobian > CRUSHED {
-        return [1.0 / jacobian, -1.0 / (jacobian * jacobian)];
-    }
-    [r - (jacobian - CRUSHED) * r * r, -r * r]
-}
-
-/// J⁻² and its derivatives, a parabola below [`CRUSHED`].
-fn inverse_square(jacobian: f64) -> [f64; 3] {
-    if jacobian > CRUSHED {
-        let r = 1.0 / jacobian;
-        return [r * r, -2.0 * r.powi(3), 6.0 * r.powi(4)];
-    }
-    let (s, r) = (jacobian - CRUSHED, 1.0 / CRUSHED);
-    let (first, second) = (-2.0 * r.powi(3), 6.0 * r.powi(4));
-    [r * r + first * s + 0.5 * second * s * s, first + second * s, second]
-}
-
-/// cof F = J F⁻ᵀ.
-pub(super) fn cofactor<const D: usize>(gradient: &Tensor<D>) -> Tensor<D> {
-    if D == 2 {
-        let sign = |i: usize, k: usize| if i == k { 1.0 } else { -1.0 };
-        return Tensor::from_fn(|i, k| sign(i, k) * gradient[(1 - i, 1 - k)]);
-    }
-    let full = embed(gradient, 1.0);
-    let [a, b, c] = [0, 1, 2].map(|k| full.column(k).into_owned());
-    let rows = [b.cross(&c), c.cross(&a), a.cross(&b)];
-    Tensor::from_fn(|i, k| rows[k][i])
 }
 
 impl<const D: usize> PointLaw<D> for EightChain<D> {

@@ -1,11 +1,11 @@
 //! Families and bonds, as a material sees them.
 
-use crate::bonds::{Bonds, Neighbour};
+use crate::bonds::{BodyGeometry, Neighbour};
 use crate::field::Field;
 
 /// A particle with its intact bonds under a displacement.
 pub struct Family<'a, const D: usize> {
-    bonds: &'a dyn Bonds<D>,
+    bonds: &'a dyn BodyGeometry<D>,
     displacement: &'a Field<D>,
     site: usize,
 }
@@ -78,7 +78,7 @@ impl<const D: usize> Bond<D> {
 
 impl<'a, const D: usize> Family<'a, D> {
     /// The family of the particle in a site.
-    pub fn new(bonds: &'a dyn Bonds<D>, displacement: &'a Field<D>, site: usize) -> Self {
+    pub fn new(bonds: &'a dyn BodyGeometry<D>, displacement: &'a Field<D>, site: usize) -> Self {
         Self { bonds, displacement, site }
     }
 

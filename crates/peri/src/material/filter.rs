@@ -1,8 +1,9 @@
 //! Pressures averaged over nearest neighbours: at a bulk modulus of a thousand shear moduli those of single particles are rough
 //! at corners of grips.
 
-use super::deformation::{Point, PointLaw};
-use crate::bonds::Bonds;
+use super::point::Point;
+use super::point_law::PointLaw;
+use crate::bonds::BodyGeometry;
 use rayon::prelude::*;
 
 /// The symmetric average b = 1 + (A − D)/(2·dimension + 1) of the particles of a lattice, with A = 1 between nearest neighbours whose bond is
@@ -18,7 +19,12 @@ pub(super) struct Filter {
 
 impl Filter {
     /// Finds the neighbours, where bonds have changed.
-    pub(super) fn link<const D: usize>(&mut self, bonds: &dyn Bonds<D>, points: &[Point<D>], spacing: f64) {
+    pub(super) fn link<const D: usize>(
+        &mut self,
+        bonds: &dyn BodyGeometry<D>,
+        points: &[Point<D>],
+        spacing: f64,
+    ) {
         let of = |site: usize| {
             let mut found = [u32::MAX; 6];
             if points[site].has_gradient() {

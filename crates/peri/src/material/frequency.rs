@@ -9,7 +9,8 @@
 //! are taken by [`WAVES`] and the springs by the greatest of Σ_j ω(1 − cos k·ξ) over Σ_j ω, both measured. Shape tensors come in by R_i: few
 //! bonds are stiff, and it is their neighbours among whom that is shared.
 
-use super::deformation::{Point, PointLaw};
+use super::point::{Point, Reach};
+use super::point_law::PointLaw;
 use super::{Body, Family};
 use crate::field::{CHUNK, chunk_range};
 use nalgebra::SVector;
@@ -20,33 +21,6 @@ const WAVES: f64 = 0.4;
 
 /// Part of a family below which its bonds are few.
 const FEW: f64 = 0.7;
-
-/// What a particle adds to the bound.
-#[derive(Clone, Copy, Debug)]
-pub struct Reach {
-    /// R and b, 1/m, and Σ_J V_J/|ξ|² of the intact bonds, m; not numbers until they are asked for.
-    size: f64,
-    own: f64,
-    squares: f64,
-    /// What R is where all neighbours are such particles: more than R where few bonds are left.
-    among: f64,
-    /// WAVES·a, Pa/m, and A of the springs with what the residual adds, over Σ_K V_K.
-    front: f64,
-    slope: f64,
-}
-
-impl Default for Reach {
-    fn default() -> Self {
-        Self { size: f64::NAN, own: f64::NAN, squares: f64::NAN, among: f64::NAN, front: 0.0, slope: 0.0 }
-    }
-}
-
-impl Reach {
-    /// Its bonds have changed.
-    pub fn forget(&mut self) {
-        self.size = f64::NAN;
-    }
-}
 
 /// Greatest Σ_j ω 2(1 − cos k·ξ) over Σ_j ω in lattices.
 fn greatest_wave<const D: usize>() -> f64 {

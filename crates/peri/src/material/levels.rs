@@ -1,8 +1,9 @@
 //! A preconditioner for operators that act on smooth fields like ∫(Δθ)²: splines on grids, each twice as wide as the one before (Bramble,
 //! Pasciak & Xu 1990, doi:10.1090/S0025-5718-1990-1023042-6).
 
-use super::relief::Vector;
-use crate::bonds::{Bonds, CloudBonds};
+use super::tensor::Vector;
+use crate::bonds::{BodyGeometry, CloudBonds};
+use polycore::numerics::bounds;
 use rayon::prelude::*;
 
 /// The finest grid in spacings: 40 % more iterations at twice that.
@@ -26,11 +27,7 @@ struct Grid<const D: usize> {
 impl<const D: usize> Levels<D> {
     /// For fields that are zero outside of `inside`, and an operator `stiffness`·∫(Δθ)² of smooth ones.
     pub(super) fn new(cloud: &CloudBonds<D>, inside: &[bool], stiffness: f64) -> Self {
-        let extreme = |pick: fn(f64, f64) -> f64, from: f64| -> [f64; D] {
-            let at = |d: usize| (0..cloud.sites()).map(move |site| cloud.position(site)[d]);
-            std::array::from_fn(|d| at(d).fold(from, pick))
-        };
-        let (low, high) = (extreme(f64::min, f64::INFINITY), extreme(f64::max, f64::NEG_INFINITY));
+        let [low, high] = bounds((0..cloud.sites()).map(|site| cloud.position(site)));
         let mut width = FINEST * cloud.spacing();
         // a cell and more around the body, for the splines at its ends
         let cells: [usize; D] = std::array::from_fn(|d| ((high[d] - low[d]) / width) as usize + 4);

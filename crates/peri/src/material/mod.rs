@@ -13,12 +13,15 @@ mod affine;
 mod bonded;
 mod cloud_passes;
 mod constitutive;
-mod deformation;
+mod crushed;
 mod eight_chain;
 mod family;
 mod filter;
 mod frequency;
 mod levels;
+mod nonlocal_solid;
+mod point;
+mod point_law;
 mod pointwise;
 mod prestrained;
 mod relief;
@@ -32,25 +35,26 @@ mod traction;
 pub use affine::{Affine, AffinePoint};
 pub use bonded::BondMaterial;
 pub use constitutive::Correspondence;
-pub use deformation::{Deformation, NonlocalSolid, Point, PointLaw, PointStress};
 pub use eight_chain::EightChain;
 pub use family::{Bond, Family};
+pub use point::Point;
+pub use point_law::{Deformation, NonlocalSolid, PointLaw, PointStress};
 pub use pointwise::{Passes, Pointwise};
 pub use prestrained::Prestrained;
 pub use relief::relief;
-pub use response::{Cover, LawRange, Response};
+pub use response::{LawCover, LawRange, Response};
 pub use strength::energy_at_strength;
 pub use tensor::Tensor;
 pub use traction::surface_load;
 
 pub use crate::bonds::Property;
 
-use crate::bonds::Bonds;
+use crate::bonds::{BodyGeometry, Bonds};
 use crate::calibrate::{Space, modulus_in, stiffness_1111};
 use crate::field::Field;
 
 /// A body in a state: its bonds and displacement.
-pub type Body<'a, const D: usize> = (&'a dyn Bonds<D>, &'a Field<D>);
+pub type Body<'a, const D: usize> = (&'a dyn BodyGeometry<D>, &'a Field<D>);
 
 /// A material: the forces between particles follow from an energy E = Σ_I V_I W_I.
 ///
@@ -121,7 +125,7 @@ pub trait Material<const D: usize>: Send + Sync {
 
     /// kθ, N/m⁶, of linear bonds t = 3kθ(λ − 1) that are about as stiff, see [`crate::calibrate::modulus_in`]: the scale of
     /// forces, of first guesses and of the preconditioner's coarse level. Equilibria do not depend on it.
-    fn micromodulus(&self, bonds: &dyn Bonds<D>) -> f64;
+    fn micromodulus(&self, bonds: &dyn BodyGeometry<D>) -> f64;
 
     /// Lamé's λ, Pa, in addition to that of bonds of [`Self::micromodulus`], for the preconditioner's coarse level: a solid of large
     /// bulk modulus needs it for fast solutions, not for right ones.
@@ -131,7 +135,7 @@ pub trait Material<const D: usize>: Send + Sync {
 
     /// Longitudinal modulus C₁₁₁₁ at rest, Pa, which scales contact; default: that of bonds of [`Self::micromodulus`], and
     /// [`Self::volumetric`].
-    fn longitudinal_modulus(&self, bonds: &dyn Bonds<D>) -> f64 {
+    fn longitudinal_modulus(&self, bonds: &dyn BodyGeometry<D>) -> f64 {
         let space = if D == 2 { Space::PlaneStress } else { Space::Solid };
         let youngs_modulus = self.micromodulus(bonds) / modulus_in(bonds, 1.0);
         stiffness_1111(space, youngs_modulus) + self.volumetric()

@@ -1,10 +1,11 @@
 //! Materials by plain loops over families: any [`Material`] at work, with the states of all particles.
 
-use super::{Bond, Cover, Family, LawRange, Material, Response};
-use crate::bonds::{Bonds, Overstretched, Property, Seen, overstretched};
+use super::{Bond, Family, LawCover, LawRange, Material, Response};
+use crate::bonds::{Bonds, Overstretched, Property, StretchScan, overstretched};
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::potential::{BondPotential, LinearBond, StretchRange};
+use polycore::numerics::ordered_sum;
 use rayon::prelude::*;
 
 /// Both passes of a material over a whole body, for one that has something faster than plain loops over bonds. The states and
@@ -119,7 +120,7 @@ impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
         &mut self,
         bonds: &mut dyn Bonds<D>,
         displacement: &Field<D>,
-        cover: &Cover,
+        cover: &LawCover,
     ) -> Result<f64, Error> {
         self.prepare(bonds, displacement);
         if let Some(known) = cover.known {
@@ -188,8 +189,7 @@ impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
             });
             each.sum::<f64>()
         };
-        let parts: Vec<f64> = bonds.particles().par_chunks(CHUNK).map(of).collect();
-        parts.iter().sum()
+        ordered_sum(bonds.particles().par_chunks(CHUNK).map(of))
     }
 
     fn released(&self, _bonds: &dyn Bonds<D>, _list: &[Overstretched], _most: f64) -> Option<f64> {
@@ -205,11 +205,11 @@ impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
         bonds: &dyn Bonds<D>,
         displacement: &Field<D>,
         critical: &Property,
-        _seen: &Seen,
+        _seen: &StretchScan,
     ) -> Vec<Overstretched> {
         // passes may collect a bond's stretch in another work item than the one that looks for it here
         if self.material.least_rest() == 1.0 {
-            return overstretched(bonds, displacement, critical, &Seen::default());
+            return overstretched(bonds, displacement, critical, &StretchScan::default());
         }
         let of = |sites: &[u32]| {
             let mut found = Vec::new();

@@ -2,7 +2,7 @@
 
 use super::bonded::mixed;
 use super::{Bond, BondMaterial, Family, Material};
-use crate::bonds::Bonds;
+use crate::bonds::BodyGeometry;
 use std::sync::Arc;
 
 /// A bond law whose bonds are at rest at the stretch λ* = |(1 + ε*)n|, with n = ξ/|ξ| and the mean ε* of the prestrains of both ends:
@@ -94,7 +94,7 @@ impl<const D: usize> Material<D> for Prestrained<D> {
         self.bonded.modulus() * family.sum(bound)
     }
 
-    fn micromodulus(&self, bonds: &dyn Bonds<D>) -> f64 {
+    fn micromodulus(&self, bonds: &dyn BodyGeometry<D>) -> f64 {
         self.bonded.micromodulus(bonds)
     }
 

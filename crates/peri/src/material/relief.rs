@@ -6,12 +6,13 @@
 //! h + Lθ takes the place of h, with L of the stabilisation, f = −Lu where A = 1 and P = 0: symmetric and positive definite as soon as some
 //! particles have θ = 0. Cf. Chen, Hillman & Rüter 2013, doi:10.1002/nme.4512.
 
-use super::deformation::LEAST_SHAPE;
 use super::levels::Levels;
-use super::tensor::invert;
-use crate::bonds::{Bonds, CloudBonds, CloudPlaces, Columns, Kind};
+use super::point::LEAST_SHAPE;
+use super::tensor::{Vector, invert};
+use crate::bonds::{BodyGeometry, Bonds, CloudBonds, CloudPlaces, Columns, Kind};
 use crate::field::{CHUNK, Field};
-use nalgebra::{SMatrix, SVector};
+use nalgebra::SMatrix;
+use polycore::numerics::{conjugate_gradients, ordered_sum};
 use rayon::prelude::*;
 
 /// The largest |h + Lθ| over the largest |h| inside.
@@ -23,7 +24,7 @@ const OPEN: f64 = 0.5;
 /// Spacings within which such a cone has no neighbour.
 const NEAR: f64 = 2.0;
 
-/// θ with h + Lθ = 0 in all particles whose family no surface cuts, and θ = 0 elsewhere, for [`Bonds::set_relief`]; `None` where there
+/// θ with h + Lθ = 0 in all particles whose family no surface cuts, and θ = 0 elsewhere, for [`crate::bonds::BondForces::set_relief`]; `None` where there
 /// is no such particle, and of lattices, which need none. To be found before any bond breaks: θ stays what it is, and the bonds that
 /// are left keep their part of the correction, so that forces follow from an energy however many break.
 pub fn relief<const D: usize>(bonds: &dyn Bonds<D>) -> Option<Field<D>> {
@@ -77,8 +78,6 @@ fn directions<const D: usize>() -> Vec<[f64; D]> {
     (0..count).map(place).collect()
 }
 
-pub(super) type Vector<const D: usize> = SVector<f64, D>;
-
 struct Problem<'a, const D: usize> {
     cloud: &'a CloudBonds<D>,
     places: CloudPlaces<D>,
@@ -110,34 +109,28 @@ impl<'a, const D: usize> Problem<'a, D> {
     /// Conjugate gradients. L is about a biharmonic operator: its diagonal alone takes iterations as the square of the body's size.
     fn solve(mut self) -> Field<D> {
         let sites = self.cloud.sites();
-        let mut theta = vec![Vector::<D>::zeros(); sites];
         // −h
         let mut residual = self.apply(None);
         let scale: Vec<f64> = (0..sites).into_par_iter().map(|site| self.diagonal(site)).collect();
         let allowed = TOLERANCE * largest(&residual);
-        let mut search = vec![Vector::<D>::zeros(); sites];
         // Lθ is about ¼m ∫(Δθ)², m = Σωξ₁⁴, of smooth fields
         let fourth = if D == 2 { 3.0 / 16.0 } else { 3.0 / 25.0 } * self.cloud.horizon().powi(2);
-        let mut levels = Levels::new(self.cloud, &self.inside, 0.25 * fourth);
-        let mut before = f64::INFINITY;
-        for _ in 0..MOST_ITERATIONS {
-            if largest(&residual) <= allowed {
-                break;
-            }
-            let mut scaled: Vec<Vector<D>> =
-                residual.par_iter().zip(&scale).map(|(r, scale)| r / *scale).collect();
-            levels.add(self.cloud, &residual, &mut scaled);
-            let product = sum(sites, |site| residual[site].dot(&scaled[site]));
-            search.par_iter_mut().zip(&scaled).for_each(|(search, scaled)| {
-                *search = scaled + *search * (product / before);
-            });
-            before = product;
+        let cloud = self.cloud;
+        let mut levels = Levels::new(cloud, &self.inside, 0.25 * fourth);
+        let precondition = |residual: &[Vector<D>], scaled: &mut [Vector<D>]| {
+            let each = scaled.par_iter_mut().zip(residual).zip(&scale);
+            each.for_each(|((scaled, r), scale)| *scaled = r / *scale);
+            levels.add(cloud, residual, scaled);
+        };
+        let product = |search: &[Vector<D>], image: &mut [Vector<D>]| {
             // −L p
-            let image = self.apply(Some(&search));
-            let step = -product / sum(sites, |site| search[site].dot(&image[site]));
-            theta.par_iter_mut().zip(&search).for_each(|(theta, search)| *theta += step * search);
-            residual.par_iter_mut().zip(&image).for_each(|(residual, image)| *residual += step * image);
-        }
+            let force = self.apply(Some(search));
+            image.par_iter_mut().zip(force).for_each(|(image, force)| *image = -force);
+        };
+        let dot = |a: &[Vector<D>], b: &[Vector<D>]| sum(sites, |site| a[site].dot(&b[site]));
+        let reached = |residual: &[Vector<D>]| largest(residual) <= allowed;
+        let (theta, _) =
+            conjugate_gradients(&mut residual, MOST_ITERATIONS, reached, product, precondition, dot);
         let mut field = Field::zeros(sites);
         theta.iter().enumerate().for_each(|(site, &theta)| field.set(site, theta.into()));
         field
@@ -187,12 +180,11 @@ impl<'a, const D: usize> Problem<'a, D> {
 }
 
 fn largest<const D: usize>(field: &[Vector<D>]) -> f64 {
-    field.iter().map(SVector::amax).fold(0.0, f64::max)
+    field.iter().map(Vector::amax).fold(0.0, f64::max)
 }
 
 /// In the order of the work items.
 fn sum(sites: usize, term: impl Fn(usize) -> f64 + Sync) -> f64 {
     let of = |chunk: usize| crate::field::chunk_range(chunk, sites).map(&term).sum::<f64>();
-    let parts: Vec<f64> = (0..sites.div_ceil(CHUNK)).into_par_iter().map(of).collect();
-    parts.iter().sum()
+    ordered_sum((0..sites.div_ceil(CHUNK)).into_par_iter().map(of))
 }

@@ -1,13 +1,13 @@
 //! What solvers ask of a material at work in a body.
 
-use crate::bonds::{Bonds, Overstretched, Property, Seen, overstretched};
+use crate::bonds::{Bonds, Overstretched, Property, StretchScan, overstretched};
 use crate::error::Error;
 use crate::field::{CHUNK, Field};
 use crate::potential::{BondPotential, StretchRange};
 
 /// Stretches over which a law is to be evaluated, and how.
 #[derive(Clone, Copy, Debug)]
-pub struct Cover {
+pub struct LawCover {
     /// Stretches [λ_low, λ_high].
     pub stretches: [f64; 2],
     /// Largest relative error of a fit.
@@ -48,7 +48,7 @@ pub trait Response<const D: usize>: Send + Sync {
         &mut self,
         bonds: &mut dyn Bonds<D>,
         displacement: &Field<D>,
-        cover: &Cover,
+        cover: &LawCover,
     ) -> Result<f64, Error>;
 
     /// The first pass: to be called before forces of a displacement, and where bonds have changed.
@@ -67,7 +67,7 @@ pub trait Response<const D: usize>: Send + Sync {
         track: Option<&mut StretchRange>,
     );
 
-    /// Sites that [`Response::force`] may begin with, see [`Bonds::piece`].
+    /// Sites that [`Response::force`] may begin with, see [`crate::bonds::BondForces::piece`].
     fn piece(&self, bonds: &dyn Bonds<D>) -> usize {
         let _ = bonds;
         CHUNK
@@ -91,7 +91,7 @@ pub trait Response<const D: usize>: Send + Sync {
         bonds: &dyn Bonds<D>,
         displacement: &Field<D>,
         critical: &Property,
-        seen: &Seen,
+        seen: &StretchScan,
     ) -> Vec<Overstretched> {
         overstretched(bonds, displacement, critical, seen)
     }

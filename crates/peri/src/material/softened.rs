@@ -1,9 +1,10 @@
 //! Bond laws whose bonds soften before they break: what the few soft bonds of a body lack against the law of the kernels.
 
 use super::{Bond, BondMaterial};
-use crate::bonds::{Bonds, Property};
+use crate::bonds::{BondForces, Property};
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::potential::{EnergyTable, KernelFit, integrity, onset, softened_energy};
+use polycore::numerics::ordered_sum;
 use rayon::prelude::*;
 
 /// The soft bonds of a displacement, by work items: site, and force density that its bonds lack, N/m³ (to be added).
@@ -13,7 +14,7 @@ pub(super) struct Lacking(Vec<Vec<(u32, [f64; 3])>>);
 /// Visits the bonds beyond the onset that a work item finds, with their stretch and λ_f; all items find each once from both of its ends.
 fn each<const D: usize>(
     end: &Property,
-    bonds: &dyn Bonds<D>,
+    bonds: &dyn BondForces<D>,
     displacement: &Field<D>,
     chunk: usize,
     visit: &mut dyn FnMut(&Bond<D>, f64),
@@ -32,7 +33,7 @@ impl Lacking {
         material: &BondMaterial,
         end: &Property,
         fit: &KernelFit,
-        bonds: &dyn Bonds<D>,
+        bonds: &dyn BondForces<D>,
         displacement: &Field<D>,
     ) -> Self {
         let (law, modulus) = (material.law(), material.modulus());
@@ -76,7 +77,7 @@ pub(super) fn lacking_energy<const D: usize>(
     material: &BondMaterial,
     end: &Property,
     table: &EnergyTable,
-    bonds: &dyn Bonds<D>,
+    bonds: &dyn BondForces<D>,
     displacement: &Field<D>,
 ) -> f64 {
     let law = material.law();
@@ -91,6 +92,5 @@ pub(super) fn lacking_energy<const D: usize>(
         });
         sum
     };
-    let parts: Vec<f64> = (0..bonds.sites().div_ceil(CHUNK)).into_par_iter().map(of).collect();
-    parts.iter().sum()
+    ordered_sum((0..bonds.sites().div_ceil(CHUNK)).into_par_iter().map(of))
 }

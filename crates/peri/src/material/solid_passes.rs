@@ -1,11 +1,13 @@
 //! Both passes of a solid on a lattice, by the kernels of [`crate::bonds`], and what they share with clouds.
 
-use super::deformation::{NonlocalSolid, Point, PointLaw};
+use super::Body;
 use super::family::Family;
 use super::filter::Filter;
+use super::point::Point;
+use super::point_law::{NonlocalSolid, PointLaw};
 use super::pointwise::Passes;
 use super::tensor::Tensor;
-use crate::bonds::{Bonds, LinearRow, Softened, StretchRange, among};
+use crate::bonds::{BodyGeometry, BondDamage, Bonds, LinearRow, Softened, StretchRange, among};
 use crate::field::{CHUNK, Field, chunk_range};
 use rayon::prelude::*;
 
@@ -34,13 +36,13 @@ impl Families {
         Self { bonded: vec![0; sites], known: None, revision: 0, sprung: Vec::new() }
     }
 
-    /// Whether bonds, or the softened ones among them, are others than in the last pass.
-    pub(super) fn changes<const D: usize>(&mut self, bonds: &dyn Bonds<D>) -> (bool, bool) {
+    /// What has changed since the last pass.
+    pub(super) fn changes<const D: usize>(&mut self, bonds: &dyn Bonds<D>) -> Changes {
         let revision = bonds.softening().revision();
         let softer = self.revision != revision;
-        let changed = softer || self.known != Some(bonds.directed_bonds());
+        let any = softer || self.known != Some(bonds.directed_bonds());
         (self.known, self.revision) = (Some(bonds.directed_bonds()), revision);
-        (changed, softer)
+        Changes { any, softer }
     }
 
     /// Finds the particles with springs and their neighbours, where there are `springs`.
@@ -78,6 +80,39 @@ impl Families {
     }
 }
 
+/// Whether bonds, or the softened ones among them, are others than in the last pass.
+#[derive(Clone, Copy)]
+pub(super) struct Changes {
+    any: bool,
+    softer: bool,
+}
+
+impl Changes {
+    /// Reshapes the particles from the site `first` on whose bonds have changed; `soft` are the softened bonds of these.
+    pub(super) fn reshape<const D: usize>(
+        self,
+        law: &impl PointLaw<D>,
+        (bonds, displacement): Body<D>,
+        (first, soft): (usize, &[Softened]),
+        bonded: &mut [u32],
+        points: &mut [Point<D>],
+    ) {
+        if !self.any {
+            return;
+        }
+        for (at, (bonded, point)) in bonded.iter_mut().zip(points).enumerate() {
+            let (site, now) = (first + at, bonds.bonded(first + at));
+            if *bonded != now || self.softer && !among(soft, site..site + 1).is_empty() {
+                *bonded = now;
+                point.reshape(&Family::new(bonds, displacement, site));
+                if now == 0 {
+                    point.spring(law);
+                }
+            }
+        }
+    }
+}
+
 impl<const D: usize, const N: usize> SolidPasses<D, N> {
     /// On a lattice; `None` elsewhere.
     pub fn new(bonds: &dyn Bonds<D>) -> Option<Self> {
@@ -110,7 +145,7 @@ impl<L: PointLaw<D>, const D: usize, const N: usize> Passes<NonlocalSolid<L>, D>
     ) {
         let Some(lattice) = bonds.as_lattice() else { return };
         let softening = lattice.softening();
-        let (changed, softer) = self.families.changes(bonds);
+        let changes = self.families.changes(bonds);
         let rows = &self.rows;
         let filters = solid.0.filtered(0.0).is_some();
         let items = self.terms.chunks_mut().into_par_iter().zip(self.families.bonded.par_chunks_mut(CHUNK));
@@ -119,16 +154,7 @@ impl<L: PointLaw<D>, const D: usize, const N: usize> Passes<NonlocalSolid<L>, D>
             let mut springs = false;
             let first = chunk * CHUNK;
             let soft = softening.among(chunk_range(chunk, lattice.sites()));
-            for at in (0..bonded.len()).filter(|_| changed) {
-                let (site, now) = (first + at, lattice.bonded(first + at));
-                if bonded[at] != now || softer && !among(soft, site..site + 1).is_empty() {
-                    bonded[at] = now;
-                    points[at].reshape(&Family::new(bonds, displacement, site));
-                    if now == 0 {
-                        solid.spring(&mut points[at]);
-                    }
-                }
-            }
+            changes.reshape(&solid.0, (bonds, displacement), (first, soft), bonded, points);
             lattice.moments::<N>(rows, displacement, chunk, &mut |base, moments| {
                 for lane in 0..moments[0].len() {
                     let at = base + lane - first;
@@ -142,13 +168,13 @@ impl<L: PointLaw<D>, const D: usize, const N: usize> Passes<NonlocalSolid<L>, D>
                             square += change.iter().map(|x| lack * x * x).sum::<f64>();
                             moment += Tensor::from_fn(|a, b| lack * change[a] * reference[b]);
                         }
-                        solid.deform(point, moment, Tensor::zeros(), square);
+                        point.deform(moment, Tensor::zeros(), square);
                         if filters {
                             continue;
                         }
-                        solid.answer(point);
+                        point.answer(&solid.0);
                     } else if bonded[at] > 0 {
-                        solid.spring(point);
+                        point.spring(&solid.0);
                         springs = true;
                     }
                     for (n, value) in point.terms().enumerate() {
@@ -160,14 +186,14 @@ impl<L: PointLaw<D>, const D: usize, const N: usize> Passes<NonlocalSolid<L>, D>
         });
         let springs = springs.reduce(|| false, |one, other| one | other);
         if filters {
-            if changed {
+            if changes.any {
                 self.filter.link(bonds, points, lattice.spacing());
             }
             self.filter.apply(&solid.0, points);
             let items = self.terms.chunks_mut().into_par_iter().zip(points.par_chunks_mut(CHUNK));
             items.for_each(|(mut terms, points)| {
                 for (at, point) in points.iter_mut().enumerate().filter(|(_, point)| point.has_gradient()) {
-                    solid.answer(point);
+                    point.answer(&solid.0);
                     point.terms().enumerate().for_each(|(n, value)| terms[n][at] = value);
                 }
             });

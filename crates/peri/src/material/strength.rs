@@ -1,7 +1,8 @@
 //! Uniform states at which a solid has its strength.
 
-use super::deformation::{Deformation, PointLaw};
+use super::point_law::{Deformation, PointLaw};
 use super::tensor::Tensor;
+use polycore::numerics::bisect;
 
 /// No solid is strained farther.
 const GREATEST: f64 = 1e3;
@@ -16,12 +17,7 @@ fn pulled<const D: usize>(law: &(impl PointLaw<D> + ?Sized), stretch: f64) -> (D
         (deformation, piola)
     };
     // a body without volume is outside of most laws
-    let (mut low, mut high) = (0.0, 2.0);
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if at(middle).1[(1, 1)] > 0.0 { high = middle } else { low = middle }
-    }
-    at(high)
+    at(bisect(0.0, 2.0, 60, |side| !(at(side).1[(1, 1)] > 0.0))[1])
 }
 
 /// Energy density W, J/m³, of the uniform state of uniaxial tension in which the stress is first `strength`, Pa: force over the
@@ -40,10 +36,7 @@ pub fn energy_at_strength<const D: usize>(law: &(impl PointLaw<D> + ?Sized), str
             return None;
         }
     }
-    for _ in 0..100 {
-        let middle = 0.5 * (low + high);
-        if beyond(middle) { high = middle } else { low = middle }
-    }
+    let [low, _] = bisect(low, high, 100, |strain| !beyond(strain));
     let (deformation, stress) = pulled(law, 1.0 + low);
     let reached = (stress[(0, 0)] / strength - 1.0).abs() < 1e-6;
     reached.then(|| law.energy(&deformation)).filter(|energy| *energy > 0.0)

@@ -1,6 +1,6 @@
 //! Tractions on the surfaces that the families of a solid see.
 
-use super::deformation::{Deformation, NonlocalSolid, PointLaw, PointStress};
+use super::point_law::{Deformation, NonlocalSolid, PointLaw, PointStress};
 use super::tensor::Tensor;
 use super::{Pointwise, Response};
 use crate::bonds::Bonds;

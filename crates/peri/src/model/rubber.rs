@@ -1,7 +1,7 @@
 //! Rubber of a bond law, described by its Young's modulus.
 
 use super::{Body, IntoMaterial};
-use crate::bonds::{Bonds, LatticeBonds};
+use crate::bonds::{BodyGeometry, LatticeBonds};
 use crate::calibrate::{Calibration, lattice_factor, modulus};
 use crate::critical::{Context, Convention, Critical, Crossing};
 use crate::error::Error;

@@ -5,6 +5,7 @@
 
 use crate::error::Error;
 use polycore::langevin::{complement, derivative, free_energy, inverse, langevin};
+use polycore::numerics::bisected;
 
 /// Newton's method needs 3 to 8 steps; its fallback, bisection, more for absurd parameters only.
 const MOST_STEPS: usize = 400;
@@ -131,12 +132,8 @@ impl Chain {
     pub fn strongest(&self) -> ChainPoint {
         // root of 1 = β(x + βx′)/D̂; β(x + βx′) lies between 2β²/3 and β, so the root between D̂ and √(3D̂/2) or about
         let excess = |beta: f64| beta * (langevin(beta) + beta * derivative(beta)) / self.dissociation - 1.0;
-        let (mut low, mut high) = (1e-3 * self.dissociation.min(1.0), 2.0 * self.dissociation.max(2.0));
-        for _ in 0..200 {
-            let middle = 0.5 * (low + high);
-            if excess(middle) < 0.0 { low = middle } else { high = middle }
-        }
-        self.at(0.5 * (low + high))
+        let (low, high) = (1e-3 * self.dissociation.min(1.0), 2.0 * self.dissociation.max(2.0));
+        self.at(bisected(low, high, 200, |beta| excess(beta) < 0.0))
     }
 }
 
@@ -171,6 +168,7 @@ fn newton(start: f64, upper: f64, value_and_slope: impl Fn(f64) -> (f64, f64)) -
 #[cfg(test)]
 mod tests {
     use super::*;
+    use polycore::numerics::bisect;
     use proptest::prelude::*;
 
     #[test]
@@ -223,12 +221,8 @@ mod tests {
             for links in [720.0f64, 90.0, 100.0, 12.5] {
                 let chain = Chain::new(links, dissociation).unwrap();
                 for ratio in [0.05, 0.3, 0.7, 0.95, 1.0, 1.05, 1.1, 1.2, 1.5] {
-                    let (mut low, mut high) = (f64::max(ratio, 1.0), 3.0 * ratio + 1.0);
-                    for _ in 0..200 {
-                        let middle = 0.5 * (low + high);
-                        let less = middle.ln() * middle * dissociation < ratio * inverse(ratio / middle);
-                        *(if less { &mut low } else { &mut high }) = middle;
-                    }
+                    let less = |x: f64| x.ln() * x * dissociation < ratio * inverse(ratio / x);
+                    let [low, _] = bisect(f64::max(ratio, 1.0), 3.0 * ratio + 1.0, 200, less);
                     let force = links.sqrt() * inverse(ratio / low) / low;
                     let found = chain.stretched(ratio * links.sqrt());
                     // the bisection resolves λ_b to ε, and β = 1/(1 − x) loses a factor 1/(1 − x) < 1e3 of it

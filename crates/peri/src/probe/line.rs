@@ -5,7 +5,7 @@
 //! No value crosses a crack of the body at rest: the nearest particle is one on the same side, and so is what is bonded to it.
 //! Where bonds broke later, the side is that of the nearest particle.
 
-use crate::bonds::{Bonds, CellGrid, Kind};
+use crate::bonds::{BodyGeometry, Bonds, CellGrid, Kind};
 use crate::geometry::{Cut, length, severed};
 use nalgebra::{Matrix3, Vector3};
 

@@ -6,7 +6,6 @@
 use crate::program::run::Peri;
 use std::process::ExitCode;
 
-mod bench;
 mod bridge;
 mod exact;
 
@@ -24,8 +23,6 @@ enum Command {
     /// Compare an export with the engine that it is for.
     #[command(subcommand)]
     Compare(bridge::Compare),
-    /// Measure bond evaluations per second, memory, and the machine's bandwidth.
-    Bench(bench::Bench),
 }
 
 /// Runs the command line of this process.
@@ -35,6 +32,5 @@ pub fn main() -> ExitCode {
         Command::Export(export) => export.print(),
         Command::Import(import) => import.print(),
         Command::Compare(compare) => compare.print(),
-        Command::Bench(bench) => bench.print(),
     })
 }

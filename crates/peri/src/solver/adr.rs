@@ -4,11 +4,11 @@
 //! with the quotient taken on increments (the displacement-weighted form has negative stiffness in many iterations).
 
 use super::balance::Goal;
-use super::load_stepping::{Equilibrium, load_stepping};
+use super::load_stepping::{Equilibrium, QuasiStatic};
 use super::mass::{has_own_mass, own_mass, update_unit_mass};
-use super::method::{Finished, Method};
+use super::method::Watch;
 use super::passes::{force_pass, move_pass};
-use super::state::{State, Status, Watch};
+use super::state::State;
 use super::system::System;
 
 use crate::bonds::StretchRange;
@@ -43,20 +43,9 @@ impl DynamicRelaxation {
     }
 }
 
-impl<const D: usize> Method<D> for DynamicRelaxation {
-    /// Solves the remaining load steps of `state`. `watch` sees every iteration and may stop the run by an error;
-    /// `finished` sees every finished step.
-    ///
-    /// # Errors
-    /// [`Error::NotConverged`], [`Error::NotFinite`], and whatever `watch` and `finished` return.
-    fn solve(
-        &self,
-        system: &mut System<D>,
-        state: &mut State<D>,
-        watch: &mut Watch<D>,
-        finished: &mut Finished<D>,
-    ) -> Result<(), Error> {
-        load_stepping(&mut RelaxationSolver::new(*self), system, state, watch, finished)
+impl<const D: usize> QuasiStatic<D> for DynamicRelaxation {
+    fn solver(&self) -> impl Equilibrium<D> {
+        RelaxationSolver::new(*self)
     }
 }
 
@@ -101,15 +90,16 @@ impl RelaxationSolver {
     ) -> Result<bool, Error> {
         let settings = self.settings;
         // a step's first iterations move farthest: beyond its range a fit must not be followed for long
-        let look =
-            system.breaks_on_the_way() || state.iteration < LOOK || state.iteration.is_multiple_of(LOOK);
+        let look = system.breaks_on_the_way()
+            || state.counts.iteration < LOOK
+            || state.counts.iteration.is_multiple_of(LOOK);
         let factor = system.factors[state.step];
         system.prepare(&state.displacement);
         let own = has_own_mass(system, state);
-        if own && (state.iteration.is_multiple_of(REFRESH) || self.own_mass.is_empty()) {
+        if own && (state.counts.iteration.is_multiple_of(REFRESH) || self.own_mass.is_empty()) {
             own_mass(system, state, &mut self.own_mass);
         }
-        let tangent = if own { system.material.bond_law().1 } else { state.tangent };
+        let tangent = if own { system.material.bond_law().1 } else { state.stretches.tangent };
         if let Some(contact) = system.repulsion() {
             self.contact_mass.clone_from(if own { &self.own_mass } else { &self.unit_mass });
             contact.add_stiffness(&*system.bonds, &state.displacement, tangent, &mut self.contact_mass);
@@ -120,7 +110,7 @@ impl RelaxationSolver {
         if !sums.is_finite() {
             return Err(system.not_finite(state));
         }
-        state.observed = state.observed.join(observed);
+        state.stretches.see(observed);
         let mut broken = false;
         if look {
             // after a refit this force still belongs to the old fit, whose range it left by little: go on
@@ -132,13 +122,13 @@ impl RelaxationSolver {
                 system.refuse_adrift(state, settings.tolerance)?;
             }
         }
-        let quotient = if state.iteration > 0 && sums.quotient_bottom > 0.0 {
+        let quotient = if state.counts.iteration > 0 && sums.quotient_bottom > 0.0 {
             -sums.quotient_top / sums.quotient_bottom
         } else {
             0.0
         };
         // where bonds soften the quotient is negative and would leave them to swing indefinitely: a long search is damped
-        let late = state.iteration.saturating_sub(LONG) as f64 / LONG as f64;
+        let late = state.counts.iteration.saturating_sub(LONG) as f64 / LONG as f64;
         let damping = (2.0 * quotient.max(0.0).sqrt()).clamp(LATE_DAMPING * late.min(1.0), 1.9);
         let goal = settings.goal();
         state.note(system, &sums, &goal);
@@ -149,21 +139,10 @@ impl RelaxationSolver {
         if let Some(contact) = system.repulsion() {
             contact.still(&mut state.velocity);
         }
-        state.iteration += 1;
-        state.step_iterations += 1;
-        state.total_iterations += 1;
-        let status = Status {
-            step: state.step,
-            steps: system.factors.len(),
-            iteration: state.iteration,
-            residual: state.residual,
-            tolerance: settings.tolerance,
-            load: state.history.last().map(|record| record.load),
-            damping,
-            broken: state.broken,
-            // masses are rebuilt from the state alone
-            restartable: state.iteration.is_multiple_of(REFRESH),
-        };
+        state.counts.iterate();
+        // masses are rebuilt from the state alone
+        let restartable = state.counts.iteration.is_multiple_of(REFRESH);
+        let status = state.status(system.factors.len(), settings.tolerance, damping, restartable);
         watch(&status, state)?;
         Ok(false)
     }

@@ -9,7 +9,7 @@ use super::load::Loads;
 use super::scale::Scale;
 use super::state::State;
 use super::system::System;
-use crate::bonds::{Bonds, components};
+use crate::bonds::{BodyGeometry, components};
 use crate::error::Error;
 use crate::field::Field;
 use std::collections::BTreeMap;
@@ -77,7 +77,7 @@ struct Piece<const D: usize> {
 
 /// The first part of a body with forces along an axis that add up to more than `tolerance` of their sizes, and that nothing can hold.
 pub fn adrift<const D: usize>(
-    bonds: &dyn Bonds<D>,
+    bonds: &dyn BodyGeometry<D>,
     loads: &Loads<D>,
     displacement: Option<&Field<D>>,
     stops: &Stops<D>,
@@ -156,7 +156,7 @@ impl<const D: usize> System<'_, D> {
         let sites = || self.bonds.particles().iter().map(|&site| site as usize);
         let loaded =
             |site: usize| self.loads.body_force.as_ref().is_some_and(|body| body.get(site) != [0.0; D]);
-        if state.broken > 0 && !sites().any(loaded) {
+        if state.fracture.broken > 0 && !sites().any(loaded) {
             return Err(self.no_equilibrium(
                 state,
                 "every particle that bore a force has lost all its bonds".to_owned(),
@@ -193,6 +193,6 @@ impl<const D: usize> System<'_, D> {
 
     fn no_equilibrium(&self, state: &State<D>, why: String) -> Error {
         let factor = self.factors.get(state.step).copied().unwrap_or(1.0);
-        Error::NoEquilibrium { step: state.step, factor, torn: state.broken > 0, why }
+        Error::NoEquilibrium { step: state.step, factor, torn: state.fracture.broken > 0, why }
     }
 }

@@ -55,14 +55,15 @@ impl Sums {
 impl<const D: usize> State<D> {
     /// Takes note of an iterate's sums: its residual, against the floor of its reference.
     pub(super) fn note(&mut self, system: &System<D>, sums: &Sums, goal: &Goal) {
-        if self.iteration.is_multiple_of(LOOK) || self.floor == 0.0 {
+        if self.counts.iteration.is_multiple_of(LOOK) || self.convergence.floor == 0.0 {
             let (scale, factor) = (&system.scale, system.factors[self.step]);
             let rounding = ROUNDING * f64::EPSILON * scale.moved(&self.displacement) / goal.tolerance;
             let strained = scale.strain(factor) * scale.constrained;
-            self.floor = (LEAST_REFERENCE * self.reference).max(strained).max(rounding);
+            self.convergence.floor =
+                (LEAST_REFERENCE * self.convergence.reference).max(strained).max(rounding);
         }
-        self.present = sums.reference();
-        self.residual = sums.residual(self.floor);
+        self.convergence.present = sums.reference();
+        self.convergence.residual = sums.residual(self.convergence.floor);
     }
 
     /// Whether the search is over; an iterate in which bonds have just `broken` never ends it.
@@ -70,11 +71,11 @@ impl<const D: usize> State<D> {
     /// # Errors
     /// [`Error::NotConverged`].
     pub(super) fn is_balanced(&mut self, goal: &Goal, broken: bool) -> Result<bool, Error> {
-        let balanced = self.residual <= goal.tolerance;
-        let spent = self.iteration >= goal.max_iterations;
-        if !broken && (balanced || (spent && self.residual <= goal.accept)) {
-            self.unconverged += u64::from(!balanced);
-            self.reference = self.reference.max(self.present);
+        let balanced = self.convergence.residual <= goal.tolerance;
+        let spent = self.counts.iteration >= goal.max_iterations;
+        if !broken && (balanced || (spent && self.convergence.residual <= goal.accept)) {
+            self.counts.unconverged += u64::from(!balanced);
+            self.convergence.reference = self.convergence.reference.max(self.convergence.present);
             return Ok(true);
         }
         if !spent {
@@ -82,8 +83,8 @@ impl<const D: usize> State<D> {
         }
         Err(Error::NotConverged {
             step: self.step,
-            iterations: self.iteration,
-            residual: self.residual,
+            iterations: self.counts.iteration,
+            residual: self.convergence.residual,
             needed: goal.tolerance,
         })
     }

@@ -1,7 +1,8 @@
 //! Bonds that break.
 
 use super::criterion::{Bilinear, Criterion, Policy, most};
-use super::state::{Event, State};
+use super::fracture::Event;
+use super::state::State;
 use super::system::System;
 use crate::bonds::{Neighbour, Overstretched, Softened, fingerprint};
 use crate::contact::Contact;
@@ -68,7 +69,7 @@ impl<const D: usize> System<'_, D> {
                 let found = self.overloaded(state, law.onset);
                 // in dynamics forces follow at once
                 let lag = if state.motion.begun { 0.0 } else { LAG };
-                let changed = soften(law, &state.softened, found, lag);
+                let changed = soften(law, &state.fracture.softened, found, lag);
                 changed.map_or_else(Vec::new, |(list, after)| {
                     softened = Some(after);
                     list
@@ -81,7 +82,7 @@ impl<const D: usize> System<'_, D> {
         }
         let released = self.material.released(&*self.bonds, &list, most(self.breaking.as_ref()));
         // what does not follow bond by bond is what the whole body loses
-        let before = released.is_none().then(|| self.stored_energy(state, state.observed));
+        let before = released.is_none().then(|| self.stored_energy(state, state.stretches.observed));
         let touches = self.contact.as_ref().is_some_and(Contact::repels);
         let pair =
             |bond: &Overstretched| [bond.site, self.bonds.bond(bond.site as usize, bond.index).site as u32];
@@ -94,11 +95,16 @@ impl<const D: usize> System<'_, D> {
             parted.extend(more.into_iter().filter(|_| touches));
         }
         let bonds = list.len() as u64 / 2;
-        state.broken += bonds;
-        let [factor, pull, push] = state.balanced;
+        state.fracture.broken += bonds;
+        let [factor, pull, push] = state.control.balanced;
         let load = self.response(factor, (pull, push)).0;
         if bonds > 0 {
-            state.events.push(Event { step: state.step, bonds, fingerprint: fingerprint(&list), load });
+            state.fracture.events.push(Event {
+                step: state.step,
+                bonds,
+                fingerprint: fingerprint(&list),
+                load,
+            });
         }
         let mut sites: Vec<u32> = list.iter().map(|bond| bond.site).collect();
         if let Some(mut softened) = softened {
@@ -106,22 +112,22 @@ impl<const D: usize> System<'_, D> {
             sites.extend(softened.iter().map(|bond| bond.site));
             sites.sort_unstable();
             self.bonds.soften(softened.clone());
-            state.softened = softened;
+            state.fracture.softened = softened;
         }
-        state.released +=
-            released.unwrap_or_else(|| before.unwrap_or(0.0) - self.stored_energy(state, state.observed));
+        state.fracture.released += released
+            .unwrap_or_else(|| before.unwrap_or(0.0) - self.stored_energy(state, state.stretches.observed));
         if let Some(contact) = self.contact.as_mut().filter(|_| touches) {
             contact.part(&*self.bonds, &parted);
         }
         if bonds > 0 {
-            let words = state.intact.get_or_insert_with(|| self.bonds.intact());
+            let words = state.fracture.intact.get_or_insert_with(|| self.bonds.intact());
             for bond in &list {
                 let (word, bit) = self.bonds.bit(bond.site as usize, bond.index);
                 words[word] &= !bit;
             }
         }
         sites.dedup();
-        state.detached += self.release(sites.iter().copied());
+        state.fracture.detached += self.release(sites.iter().copied());
         sites
     }
 

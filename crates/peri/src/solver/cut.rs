@@ -26,22 +26,22 @@ impl<const D: usize> System<'_, D> {
         let at = state.step;
         let before = at.checked_sub(1).map_or(0.0, |before| self.factors[before]);
         let length = self.factors[at] - before;
-        let may = self.refine > 1 && state.round == 0 && length.abs() > (1.0 + CRUMB) * shortest;
-        let stretched = self.is_overstretched(state.balanced_stretches);
+        let may = self.refine > 1 && state.control.round == 0 && length.abs() > (1.0 + CRUMB) * shortest;
+        let stretched = self.is_overstretched(state.stretches.balanced);
         if !(may && stretched && !self.beyond(state).is_empty()) {
             return false;
         }
         let old = state.history.last().map_or(1.0, |record| record.largest_stretch);
-        let new = if state.cuts < BY_STRETCH {
-            self.around([before, old], [self.factors[at], state.largest_stretch()], shortest)
+        let new = if state.control.cuts < BY_STRETCH {
+            self.around([before, old], [self.factors[at], state.stretches.largest()], shortest)
         } else {
             vec![before + 0.5 * length]
         };
         self.insert(state, &new);
-        state.cuts += 1;
+        state.control.cuts += 1;
         let rest = || Field::zeros(state.displacement.sites());
-        state.displacement = if at == 0 { rest() } else { state.past.pop().unwrap_or_else(rest) };
-        (state.predicted, state.iteration) = (false, 0);
+        state.displacement = if at == 0 { rest() } else { state.control.past.pop().unwrap_or_else(rest) };
+        (state.control.predicted, state.counts.iteration) = (false, 0);
         true
     }
 
@@ -81,49 +81,7 @@ impl<const D: usize> System<'_, D> {
 
     /// Puts load factors before that of the present step.
     pub(super) fn insert(&mut self, state: &mut State<D>, new: &[f64]) {
-        state.insert(&self.factors, new);
-        self.factors.to_mut().clone_from(&state.factors);
-    }
-}
-
-impl<const D: usize> State<D> {
-    /// Of the last equilibrium.
-    pub(super) fn largest_stretch(&self) -> f64 {
-        (1.0 + self.balanced_stretches.high).sqrt()
-    }
-
-    /// As [`System::insert`].
-    fn insert(&mut self, factors: &[f64], new: &[f64]) {
-        let (at, count) = (self.step, new.len());
-        self.factors = factors.to_vec();
-        self.factors.splice(at..at, new.iter().copied());
-        self.inserted.iter_mut().filter(|row| **row >= at).for_each(|row| *row += count);
-        self.inserted.extend(at..at + count);
-        self.inserted.sort_unstable();
-    }
-
-    /// How many prescribed steps are over after the first `rows` of the history, the last of which is one of them.
-    pub fn prescribed(&self, rows: usize) -> Option<usize> {
-        let last = rows.checked_sub(1)?;
-        let inserted = self.inserted.partition_point(|&row| row < last);
-        (self.inserted.get(inserted) != Some(&last)).then(|| rows - inserted)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn prescribed_steps_keep_their_numbers() {
-        let mut state = State::<2>::new(0);
-        state.step = 1;
-        state.insert(&[0.5, 1.0], &[0.6, 0.7]);
-        state.step = 2;
-        let factors = state.factors.clone();
-        state.insert(&factors, &[0.65]);
-        assert_eq!(state.factors, [0.5, 0.6, 0.65, 0.7, 1.0]);
-        let numbers: Vec<_> = (0..=5).map(|rows| state.prescribed(rows)).collect();
-        assert_eq!(numbers, [None, Some(1), None, None, None, Some(2)]);
+        state.control.insert(state.step, &self.factors, new);
+        self.factors.to_mut().clone_from(&state.control.factors);
     }
 }

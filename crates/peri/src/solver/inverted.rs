@@ -2,7 +2,7 @@
 
 use super::load::Loads;
 use super::system::System;
-use crate::bonds::Bonds;
+use crate::bonds::BodyGeometry;
 use crate::error::Error;
 use std::collections::{BTreeMap, HashMap};
 
@@ -17,7 +17,11 @@ pub const INVERTS: &str =
 const SPANS: f64 = 0.1;
 
 /// What is found, or nothing, where prescribed displacements at any of the load factors `factors`, or between them, press a body through itself.
-pub fn inverted<const D: usize>(bonds: &dyn Bonds<D>, loads: &Loads<D>, factors: &[f64]) -> Option<String> {
+pub fn inverted<const D: usize>(
+    bonds: &dyn BodyGeometry<D>,
+    loads: &Loads<D>,
+    factors: &[f64],
+) -> Option<String> {
     loads.displacement.as_ref()?;
     // a turn is no multiple of its end
     if !loads.turned.is_empty() {
@@ -27,7 +31,7 @@ pub fn inverted<const D: usize>(bonds: &dyn Bonds<D>, loads: &Loads<D>, factors:
 }
 
 /// Grips of one displacement each, and whether one of them passes another.
-fn passing<const D: usize>(bonds: &dyn Bonds<D>, loads: &Loads<D>, factors: &[f64]) -> Option<String> {
+fn passing<const D: usize>(bonds: &dyn BodyGeometry<D>, loads: &Loads<D>, factors: &[f64]) -> Option<String> {
     let field = loads.displacement.as_ref()?;
     let mut grips: BTreeMap<(u8, [u64; D]), Vec<usize>> = BTreeMap::new();
     for site in bonds.particles().iter().map(|&site| site as usize) {
@@ -69,7 +73,7 @@ type Passed<const D: usize> = (f64, [f64; D], usize);
 
 /// Where and from which load factor on particles of the second grip, which moves by `apart` against the first, pass through it.
 fn passes<const D: usize>(
-    bonds: &dyn Bonds<D>,
+    bonds: &dyn BodyGeometry<D>,
     [here, there]: [&[usize]; 2],
     apart: [f64; D],
     [low, high]: [f64; 2],
@@ -114,7 +118,7 @@ fn passes<const D: usize>(
 }
 
 /// Particles whose whole surroundings are prescribed and have det F ≤ 0 at a load factor.
-fn turned<const D: usize>(bonds: &dyn Bonds<D>, loads: &Loads<D>, factors: &[f64]) -> Option<String> {
+fn turned<const D: usize>(bonds: &dyn BodyGeometry<D>, loads: &Loads<D>, factors: &[f64]) -> Option<String> {
     let field = loads.displacement.as_ref()?;
     let all = (1_u8 << D) - 1;
     let mut known = Vec::new();

@@ -3,13 +3,14 @@
 //! condition), found by secants.
 
 use super::balance::Goal;
-use super::load_stepping::{Equilibrium, load_stepping};
+use super::load_stepping::{Equilibrium, QuasiStatic};
 use super::memory::Memory;
-use super::method::{Finished, Method};
+use super::method::Watch;
 use super::passes::{Sums, gradient_pass};
 use super::places::Places;
 use super::preconditioner::Preconditioner;
-use super::state::{State, Status, Watch};
+use super::record::Status;
+use super::state::State;
 use super::system::System;
 use crate::bonds::{StretchRange, stretch_range};
 use crate::contact::Contact;
@@ -81,20 +82,9 @@ impl Lbfgs {
     }
 }
 
-impl<const D: usize> Method<D> for Lbfgs {
-    /// Solves the remaining load steps of `state`. `watch` sees every iteration and may stop the run by an error;
-    /// `finished` sees every finished step.
-    ///
-    /// # Errors
-    /// [`Error::NotConverged`], [`Error::NotFinite`], and whatever `watch` and `finished` return.
-    fn solve(
-        &self,
-        system: &mut System<D>,
-        state: &mut State<D>,
-        watch: &mut Watch<D>,
-        finished: &mut Finished<D>,
-    ) -> Result<(), Error> {
-        load_stepping(&mut LbfgsSolver::new(*self), system, state, watch, finished)
+impl<const D: usize> QuasiStatic<D> for Lbfgs {
+    fn solver(&self) -> impl Equilibrium<D> {
+        LbfgsSolver::new(*self)
     }
 }
 
@@ -191,17 +181,7 @@ impl<const D: usize> LbfgsSolver<D> {
     }
 
     fn status(&self, system: &System<D>, state: &State<D>, restartable: bool) -> Status {
-        Status {
-            step: state.step,
-            steps: system.factors.len(),
-            iteration: state.iteration,
-            residual: state.residual,
-            tolerance: self.settings.tolerance,
-            load: state.history.last().map(|record| record.load),
-            damping: 0.0,
-            broken: state.broken,
-            restartable,
-        }
+        state.status(system.factors.len(), self.settings.tolerance, 0.0, restartable)
     }
 
     /// New forces at the present displacement; their gradient goes to `self.trial`.
@@ -221,7 +201,7 @@ impl<const D: usize> LbfgsSolver<D> {
         if !point.sums.is_finite() {
             return Ok(point);
         }
-        state.observed = state.observed.join(point.observed);
+        state.stretches.see(point.observed);
         Ok(if system.widen(state)? { self.evaluate(system, state) } else { point })
     }
 
@@ -266,9 +246,9 @@ impl<const D: usize> LbfgsSolver<D> {
                 step = low + (high - low) * (1.0 / excess).clamp(1e-6, 0.5);
                 continue;
             }
-            state.observed = state.observed.join(rough.observed);
+            state.stretches.see(rough.observed);
             let point = if system.widen(state)? { self.evaluate(system, state) } else { rough };
-            if point.sums.residual(state.floor) <= self.settings.tolerance
+            if point.sums.residual(state.convergence.floor) <= self.settings.tolerance
                 || point.slope.abs() <= SLOPE * slope.abs()
             {
                 return Ok(Search::Found(step, point));
@@ -387,18 +367,20 @@ impl<const D: usize> Equilibrium<D> for LbfgsSolver<D> {
         // a run can be interrupted where it is built
         // small steps between which bonds break leave the body much as it was; contact and large steps do not
         let kept = system.breaking.is_some() && system.repulsion().is_none();
-        let fresh = state.round == 0 && state.renewals == 0 && (!kept || state.step.is_multiple_of(STEPS));
+        let fresh = state.control.round == 0
+            && state.contact.renewals == 0
+            && (!kept || state.step.is_multiple_of(STEPS));
         let due = fresh || self.worn || self.searches >= SEARCHES;
-        if !self.preconditioner.is_built() || (state.iteration == 0 && due) {
+        if !self.preconditioner.is_built() || (state.counts.iteration == 0 && due) {
             self.begin(system, state, watch)?;
         }
-        let before = state.total_iterations;
+        let before = state.counts.total_iterations;
         let mut point = self.arrive(system, state)?;
         let mut broken = false;
         loop {
             state.note(system, &point.sums, &goal);
             if state.is_balanced(&goal, broken)? {
-                let took = state.total_iterations - before;
+                let took = state.counts.total_iterations - before;
                 self.first = if self.searches == 0 { took } else { self.first };
                 self.searches += 1;
                 self.worn = took > WORN * self.first.max(FEW);
@@ -406,9 +388,7 @@ impl<const D: usize> Equilibrium<D> for LbfgsSolver<D> {
             }
             broken = false;
             let next = self.iterate(system, state, &point)?;
-            state.iteration += 1;
-            state.step_iterations += 1;
-            state.total_iterations += 1;
+            state.counts.iterate();
             if let Some(next) = next {
                 point = next;
             } else {
@@ -425,8 +405,9 @@ impl<const D: usize> Equilibrium<D> for LbfgsSolver<D> {
                 }
             }
             watch(&self.status(system, state, false), state)?;
-            let others_touch = state.iteration.is_multiple_of(TOUCHES) && self.others_touch(system, state);
-            if state.iteration.is_multiple_of(ITERATIONS) || others_touch {
+            let others_touch =
+                state.counts.iteration.is_multiple_of(TOUCHES) && self.others_touch(system, state);
+            if state.counts.iteration.is_multiple_of(ITERATIONS) || others_touch {
                 self.begin(system, state, watch)?;
                 point = self.arrive(system, state)?;
             }

@@ -1,7 +1,7 @@
 //! Loads and supports: body forces and prescribed displacement components, proportional to one load factor but for regions that turn.
 
 use super::rotation::Turned;
-use crate::bonds::{Bonds, has_whole_family};
+use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field};
 use rayon::prelude::*;
 
@@ -74,7 +74,12 @@ impl<const D: usize> Loads<D> {
 
     /// What the loads pull, N·m: Σ −F V·d over constrained components with d the rate of their displacement over the factor, and
     /// Σ b V·u with b the body force at factor 1. `force` holds out-of-balance force densities.
-    pub fn conjugates(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>, force: &Field<D>) -> (f64, f64) {
+    pub fn conjugates(
+        &self,
+        bonds: &dyn BodyGeometry<D>,
+        displacement: &Field<D>,
+        force: &Field<D>,
+    ) -> (f64, f64) {
         let (mut pull, mut push) = (0.0, 0.0);
         for &site in bonds.particles() {
             let site = site as usize;
@@ -94,7 +99,7 @@ impl<const D: usize> Loads<D> {
 
     /// How far apart the prescribed displacements are at factor 1, m: √Σ_d (max − min)²; of turned regions the longest arc; `rigid` are
     /// those of rigid planes.
-    pub fn reach(&self, bonds: &dyn Bonds<D>, rigid: &[[f64; D]]) -> f64 {
+    pub fn reach(&self, bonds: &dyn BodyGeometry<D>, rigid: &[[f64; D]]) -> f64 {
         let mut turned = vec![false; if self.turned.is_empty() { 0 } else { bonds.sites() }];
         self.turned.iter().flat_map(|region| &region.sites).for_each(|&site| turned[site as usize] = true);
         let still = |site: usize| !turned.get(site).copied().unwrap_or(false);
@@ -117,7 +122,7 @@ impl<const D: usize> Loads<D> {
     }
 
     /// Total body force at factor 1 along each axis, N: of both directions the larger.
-    pub fn applied(&self, bonds: &dyn Bonds<D>) -> [f64; D] {
+    pub fn applied(&self, bonds: &dyn BodyGeometry<D>) -> [f64; D] {
         let Some(body) = &self.body_force else { return [0.0; D] };
         let sum = |d: usize, sign: f64| {
             let each = bonds
@@ -135,7 +140,7 @@ impl<const D: usize> Loads<D> {
     /// `rigid` as [`Loads::reach`].
     pub fn response(
         &self,
-        bonds: &dyn Bonds<D>,
+        bonds: &dyn BodyGeometry<D>,
         factor: f64,
         (pull, push): (f64, f64),
         rigid: &[[f64; D]],
@@ -149,7 +154,7 @@ impl<const D: usize> Loads<D> {
     }
 
     /// Reaction on each region of prescribed displacement, N; components that are not constrained give none.
-    pub fn reactions(&self, bonds: &dyn Bonds<D>, force: &Field<D>) -> Vec<[f64; 3]> {
+    pub fn reactions(&self, bonds: &dyn BodyGeometry<D>, force: &Field<D>) -> Vec<[f64; 3]> {
         let of_region = |sites: &Vec<u32>| {
             let mut sum = [0.0; 3];
             for &site in sites {
@@ -167,7 +172,7 @@ impl<const D: usize> Loads<D> {
 
     /// Force with which the regions of prescribed displacement hold or pull along each axis, N: their reactions in one
     /// direction, or in the other if these are more. A particle counts in the first region that has it.
-    pub fn reaction(&self, bonds: &dyn Bonds<D>, force: &Field<D>) -> [f64; D] {
+    pub fn reaction(&self, bonds: &dyn BodyGeometry<D>, force: &Field<D>) -> [f64; D] {
         let mut counted = vec![false; self.constrained.len()];
         let (mut up, mut down) = ([0.0; D], [0.0; D]);
         for sites in &self.held_regions {
@@ -192,7 +197,7 @@ impl<const D: usize> Loads<D> {
 
     /// An affine field u_d = a_d + Σ_e B_de X_e to start from: closest to the prescribed displacements where there are
     /// any, in balance with the body forces otherwise. One row (a_d, B_d1, …) per component, at load factor 1.
-    pub fn affine_predictor(&self, bonds: &dyn Bonds<D>, stiffness: f64) -> [[f64; 4]; D] {
+    pub fn affine_predictor(&self, bonds: &dyn BodyGeometry<D>, stiffness: f64) -> [[f64; 4]; D] {
         if self.displacement.is_some() {
             self.affine_closest(bonds)
         } else if self.body_force.is_some() {
@@ -203,7 +208,7 @@ impl<const D: usize> Loads<D> {
     }
 
     /// Least squares, of least norm, over the prescribed displacements: moves the whole body with its grips.
-    fn affine_closest(&self, bonds: &dyn Bonds<D>) -> [[f64; 4]; D] {
+    fn affine_closest(&self, bonds: &dyn BodyGeometry<D>) -> [[f64; 4]; D] {
         let mut result = [[0.0; 4]; D];
         let Some(field) = &self.displacement else { return result };
         for d in 0..D {
@@ -247,7 +252,7 @@ impl<const D: usize> Loads<D> {
     /// The homogeneous strain H whose bond forces do the same virtual work as the body forces in every homogeneous
     /// strain: Σ_I V_I Σ_J kθK w V_J |ξ| (n·Hn)(n·Gn) = Σ_I V_I b·G X for all symmetric G (Galerkin's projection).
     /// `stiffness` is kθK.
-    fn affine_balance(&self, bonds: &dyn Bonds<D>, stiffness: f64) -> [[f64; 4]; D] {
+    fn affine_balance(&self, bonds: &dyn BodyGeometry<D>, stiffness: f64) -> [[f64; 4]; D] {
         let mut result = [[0.0; 4]; D];
         let Some(body_force) = &self.body_force else { return result };
         // components (a, b) of H, a ≤ b; off the diagonal each stands for two
@@ -268,7 +273,7 @@ impl<const D: usize> Loads<D> {
                 }
             });
         };
-        let is_whole = |site: usize| has_whole_family(bonds, site);
+        let is_whole = |site: usize| bonds.has_whole_family(site);
         let mut of_whole = [[0.0; 6]; 6];
         let some = bonds.particles().iter().find(|&&site| is_whole(site as usize));
         some.iter().for_each(|&&site| of_site(site as usize, &mut of_whole));

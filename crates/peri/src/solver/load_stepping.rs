@@ -1,8 +1,9 @@
 //! Load step after load step: a first guess, an equilibrium, the bonds that break in it, the next equilibrium.
 
-use super::method::Finished;
+use super::method::{Finished, Method, Watch};
+use super::record::Record;
 use super::scale::{Balance, Scale};
-use super::state::{Record, State, Watch};
+use super::state::State;
 use super::system::System;
 
 use crate::bonds::StretchRange;
@@ -30,6 +31,25 @@ pub trait Equilibrium<const D: usize> {
     fn tolerance(&self) -> f64;
 }
 
+/// Settings of a method that seeks one equilibrium after the other.
+pub trait QuasiStatic<const D: usize> {
+    /// The method at work.
+    fn solver(&self) -> impl Equilibrium<D>;
+}
+
+impl<const D: usize, M: QuasiStatic<D>> Method<D> for M {
+    /// Solves the remaining load steps of `state`, see [`load_stepping`].
+    fn solve(
+        &self,
+        system: &mut System<D>,
+        state: &mut State<D>,
+        watch: &mut Watch<D>,
+        finished: &mut Finished<D>,
+    ) -> Result<(), Error> {
+        load_stepping(&mut self.solver(), system, state, watch, finished)
+    }
+}
+
 /// Solves the remaining load steps of `state`; `finished` sees every finished step and, with [`State::round`] above 0,
 /// every equilibrium in which bonds have just broken.
 ///
@@ -44,7 +64,7 @@ pub fn load_stepping<const D: usize>(
     watch: &mut Watch<D>,
     finished: &mut Finished<D>,
 ) -> Result<(), Error> {
-    if state.step == 0 && !state.predicted {
+    if state.step == 0 && !state.control.predicted {
         system.refuse_inverted(&system.factors)?;
     }
     let stepped = step_by_step(method, system, state, watch, finished);
@@ -70,19 +90,19 @@ fn step_by_step<const D: usize>(
     let (tolerance, forced) = (method.tolerance(), system.loads.body_force.is_some());
     system.refuse_adrift(state, tolerance)?;
     'steps: while state.step < system.factors.len() {
-        if !state.predicted && system.friction().is_some() {
-            state.started = Some(state.displacement.clone());
-            state.held.clone_from(&state.grips);
-            state.held.iter_mut().for_each(|grip| grip.share = 1.0);
-            state.renewals = 0;
+        if !state.control.predicted && system.friction().is_some() {
+            state.contact.start = Some(state.displacement.clone());
+            state.contact.active.clone_from(&state.contact.grips);
+            state.contact.active.iter_mut().for_each(|grip| grip.share = 1.0);
+            state.contact.renewals = 0;
         }
         system.begin_step(state);
-        if !state.predicted && system.cut_at_touch(state) {
+        if !state.control.predicted && system.cut_at_touch(state) {
             continue;
         }
-        if !state.predicted {
+        if !state.control.predicted {
             predict(system, state, &predictor);
-            state.predicted = true;
+            state.control.predicted = true;
             // the step may leap out of the fitted range: its first force and mass must know
             system.covers_stretches(state, None)?;
         }
@@ -99,7 +119,7 @@ fn step_by_step<const D: usize>(
                 if !system.renew_friction(state, method.tolerance()) {
                     break;
                 }
-                state.iteration = 0;
+                state.counts.iteration = 0;
             }
             if system.cut(state, shortest) {
                 continue 'steps;
@@ -108,17 +128,17 @@ fn step_by_step<const D: usize>(
             if system.lower(state, shortest) {
                 continue;
             }
-            let sites = if system.is_overstretched(state.balanced_stretches) {
+            let sites = if system.is_overstretched(state.stretches.balanced) {
                 system.break_bonds(state)
             } else {
                 Vec::new()
             };
-            state.round += 1;
-            state.iteration = 0;
+            state.control.round += 1;
+            state.counts.iteration = 0;
             if sites.is_empty() {
                 break;
             }
-            state.cuts = 0;
+            state.control.cuts = 0;
             method.broke(system, &sites);
             system.refuse_adrift(state, tolerance)?;
             finished(&*system.bonds, state)?;
@@ -128,9 +148,9 @@ fn step_by_step<const D: usize>(
         system.check_overlaps(state)?;
         record(system, state);
         state.step += 1;
-        state.predicted = false;
-        state.round = 0;
-        (state.step_iterations, state.cuts) = (0, 0);
+        state.control.predicted = false;
+        state.control.round = 0;
+        (state.counts.step_iterations, state.control.cuts) = (0, 0);
         system.raise(state, shortest);
         if forced {
             state.accept();
@@ -157,19 +177,19 @@ fn predict<const D: usize>(system: &System<D>, state: &mut State<D>, predictor: 
     // flanks that meet turn displacements in their course
     let smooth = system.repulsion().is_none();
     if state.step > 0 && system.breaking.is_some() && (smooth || system.refine > 1) {
-        state.past.push(state.displacement.clone());
-        if state.past.len() > 3 {
-            state.past.remove(0);
+        state.control.past.push(state.displacement.clone());
+        if state.control.past.len() > 3 {
+            state.control.past.remove(0);
         }
     }
     let even = |back: usize| (at(back) - at(back + 1) - increment).abs() <= 1e-6 * increment.abs();
-    let weights: &[f64] = match state.past.len() {
+    let weights: &[f64] = match state.control.past.len() {
         _ if !smooth => &[],
         3 if even(1) && even(2) => &[1.0, -3.0, 3.0],
         2 | 3 if even(1) => &[-1.0, 2.0],
         _ => &[],
     };
-    let past = &state.past[state.past.len() - weights.len()..];
+    let past = &state.control.past[state.control.past.len() - weights.len()..];
     if !system.loads.turned.is_empty() {
         system.loads.carry(&*system.bonds, [at(1), factor], &mut state.displacement);
     }
@@ -202,22 +222,20 @@ fn predict<const D: usize>(system: &System<D>, state: &mut State<D>, predictor: 
 fn work_of_loads<const D: usize>(system: &System<D>, state: &mut State<D>) {
     let factor = system.factors[state.step];
     if let Some(contact) = system.friction() {
-        state.rubbing = contact.slide(&state.displacement).2;
+        state.contact.plane_friction = contact.slide(&state.displacement).2;
     }
     let (pull, push) = system.conjugates(state);
-    let [old_factor, old_pull, old_push] = state.balanced;
+    let [old_factor, old_pull, old_push] = state.control.balanced;
     state.work += 0.5 * (pull + old_pull) * (factor - old_factor);
     state.work += 0.5 * (factor + old_factor) * (push - old_push);
-    state.balanced = [factor, pull, push];
+    state.control.balanced = [factor, pull, push];
 }
 
 fn record<const D: usize>(system: &mut System<D>, state: &mut State<D>) {
-    let [factor, pull, push] = state.balanced;
-    let observed = state.balanced_stretches;
-    let (load, displacement) = system.response(factor, (pull, push));
+    let observed = state.stretches.balanced;
     // softening takes rounds of its own
-    if state.round > 1 || state.history.last().map_or(0, |r| r.broken) != state.broken {
-        state.past.clear();
+    if state.control.round > 1 || state.history.last().map_or(0, |r| r.broken) != state.fracture.broken {
+        state.control.past.clear();
     }
     // planes push at the final displacement
     if let Some(contact) = system.contact.as_mut().filter(|contact| contact.repels()) {
@@ -225,40 +243,19 @@ fn record<const D: usize>(system: &mut System<D>, state: &mut State<D>) {
     }
     if let Some(contact) = system.friction() {
         let (grips, dissipated, _) = contact.slide(&state.displacement);
-        state.grips = grips;
-        state.motion.rubbed += dissipated;
+        state.contact.grips = grips;
+        state.motion.energies.rubbed += dissipated;
     }
     let balance = Balance::new(system, state);
-    let record = Record {
-        factor,
-        load,
-        displacement,
-        reactions: system.loads.reactions(&*system.bonds, &state.force),
-        residual: state.residual,
-        iterations: state.step_iterations,
-        rounds: state.round,
-        broken: state.broken,
-        detached: state.detached,
-        stored: system.stored_energy(state, system.fitted_part(observed)),
-        balance,
-        contact: system.touching(state),
-        work: state.work,
-        released: state.released,
-        smallest_stretch: (1.0 + observed.low).max(0.0).sqrt(),
-        largest_stretch: (1.0 + observed.high).sqrt(),
-        time: 0.0,
-        kinetic: 0.0,
-        damped: 0.0,
-        rubbed: state.motion.rubbed,
-        resting: system.resting(state),
-        seen: system.seen(state),
-    };
-    state.history.push(record);
+    let stored = system.stored_energy(state, system.fitted_part(observed));
+    let row = system.row(state, state.control.balanced, observed, stored);
+    let (residual, rounds) = (state.convergence.residual, state.control.round);
+    state.history.push(Record { residual, rounds, balance, time: 0.0, kinetic: 0.0, damped: 0.0, ..row });
 }
 
 /// Whether the load has fallen below the part of its largest at which the run is to stop.
 fn severed<const D: usize>(system: &System<D>, state: &State<D>) -> bool {
     let largest = state.history.iter().map(|r| r.load.abs()).fold(0.0, f64::max);
     let last = state.history.last().map_or(0.0, |r| r.load.abs());
-    system.stop_below > 0.0 && state.broken > 0 && last < system.stop_below * largest
+    system.stop_below > 0.0 && state.fracture.broken > 0 && last < system.stop_below * largest
 }

@@ -2,17 +2,17 @@
 
 use super::state::State;
 use super::system::System;
-use crate::bonds::{Bonds, has_whole_family};
+use crate::bonds::BodyGeometry;
 use rayon::prelude::*;
 
 /// Whether bonds differ so much in their tangent that every particle has the mass of its own.
 pub fn has_own_mass<const D: usize>(system: &System<D>, state: &State<D>) -> bool {
-    system.material.has_own_stiffness(state.tangent)
+    system.material.has_own_stiffness(state.stretches.tangent)
 }
 
 /// Σ_J (2 w V_J/|ξ|)(1 + max_{d≠e} |n_d n_e|): the Gershgorin sum of a particle for a unit bond tangent.
 /// 1 where there is no bond, so that empty sites and detached particles stay at rest.
-pub fn update_unit_mass<const D: usize>(bonds: &dyn Bonds<D>, sites: &[u32], mass: &mut [f64]) {
+pub fn update_unit_mass<const D: usize>(bonds: &dyn BodyGeometry<D>, sites: &[u32], mass: &mut [f64]) {
     let sum = |site: u32| {
         let mut sum = 0.0;
         bonds.neighbours(site as usize, &mut |bond| {
@@ -23,7 +23,7 @@ pub fn update_unit_mass<const D: usize>(bonds: &dyn Bonds<D>, sites: &[u32], mas
         });
         if sum > 0.0 { sum } else { 1.0 }
     };
-    let is_whole = |site: u32| has_whole_family(bonds, site as usize);
+    let is_whole = |site: u32| bonds.has_whole_family(site as usize);
     let alike = sites.iter().find(|&&site| is_whole(site)).map(|&site| sum(site));
     let of = |&site: &u32| alike.filter(|_| is_whole(site)).unwrap_or_else(|| sum(site));
     let sums: Vec<f64> = sites.par_iter().map(of).collect();
@@ -34,7 +34,7 @@ pub fn update_unit_mass<const D: usize>(bonds: &dyn Bonds<D>, sites: &[u32], mas
 
 /// The bounds of all particles with each bond's own tangent, over kθ.
 pub fn own_mass<const D: usize>(system: &mut System<D>, state: &State<D>, mass: &mut Vec<f64>) {
-    let sums = system.material.own_stiffness(&*system.bonds, &state.displacement, state.fitted);
+    let sums = system.material.own_stiffness(&*system.bonds, &state.displacement, state.stretches.fitted);
     mass.resize(system.bonds.sites(), 1.0);
     for (&site, sum) in system.bonds.particles().iter().zip(sums) {
         mass[site as usize] = if sum > 0.0 { sum } else { 1.0 };

@@ -1,8 +1,11 @@
 //! What all methods have in common.
 
-use super::{State, System, Watch};
+use super::{State, Status, System};
 use crate::bonds::Bonds;
 use crate::error::Error;
+
+/// Sees every iteration, and may stop the run by an error.
+pub type Watch<'a, const D: usize> = dyn FnMut(&Status, &State<D>) -> Result<(), Error> + 'a;
 
 /// Sees the bonds and the state after every finished step; may stop the solution by an error.
 pub type Finished<'a, const D: usize> = dyn FnMut(&dyn Bonds<D>, &State<D>) -> Result<(), Error> + 'a;

@@ -8,12 +8,12 @@
 //! may have changed by [`STRAIN`], and otherwise are the more seldom the slower m grows; ω² is measured again where m or the stretches have
 //! come far from where they were: r changes with the stretches. All that follows from the state alone.
 
+use super::motion::Pace;
 use super::state::State;
 use super::system::System;
 use super::time_step::largest_frequency_squared;
 use super::verlet::VelocityVerlet;
 use crate::bonds::stretch_range;
-use serde::{Deserialize, Serialize};
 
 /// Factor on ω² by which it may grow until steps are shortened.
 const MARGIN: f64 = 1.3;
@@ -32,26 +32,6 @@ const STRAIN: f64 = 0.2;
 /// Most steps between two looks, and looks between two at whether steps may be longer.
 const SELDOM: u32 = 8;
 const WAITS: u32 = 32;
-
-/// What is known of the greatest frequency.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Pace {
-    /// m when ω² was last measured, N/m⁴, and r.
-    bound: f64,
-    part: f64,
-    /// ρω² that steps are made for, without the margin.
-    covered: f64,
-    /// m at the last look, steps between it and the next, and steps until then; looks since steps were changed.
-    last: f64,
-    every: u32,
-    due: u32,
-    looks: u32,
-    /// Strain since the last look, at most.
-    strain: f64,
-    /// Least and greatest stretch for which r holds, and whether a look has met others.
-    known: [f64; 2],
-    outgrown: bool,
-}
 
 impl Pace {
     /// ω² by the bound and as it is allowed for, 1/s².
@@ -115,7 +95,7 @@ impl VelocityVerlet {
         if !pace.is_due(strain) {
             return false;
         }
-        state.motion.bounds += 1;
+        state.motion.limits.bounds += 1;
         let enough = pace.covered / pace.part;
         let bound = system.material.frequency_bound(&*system.bonds, &state.displacement, enough);
         let [low, high] = stretches(system, state);
@@ -151,7 +131,7 @@ impl VelocityVerlet {
         let enough = pace.covered / pace.part / if waited { BELOW } else { 1.0 };
         let mut bound = known;
         if broken || waited {
-            state.motion.bounds += 1;
+            state.motion.limits.bounds += 1;
             system.prepare(&state.displacement);
             bound = system.material.frequency_bound(&*system.bonds, &state.displacement, enough);
             state.motion.pace.see(bound);
@@ -164,9 +144,9 @@ impl VelocityVerlet {
             return;
         }
         if pace.outgrown || bound > ABOVE * pace.bound || falls && BELOW * bound <= pace.bound {
-            let shortest = state.motion.shortest;
+            let shortest = state.motion.limits.bonds.shortest;
             let frequency = largest_frequency_squared(system, state, volumes, self.density, shortest);
-            state.motion.searches += 1;
+            state.motion.limits.searches += 1;
             self.measure(system, state, frequency);
         } else {
             pace.covered = pace.part * bound;

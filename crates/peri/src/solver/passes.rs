@@ -140,7 +140,7 @@ pub fn gradient_pass<const D: usize>(
                     *force = 0.0;
                 }
                 let (volumes, direction) = (&volumes[particles.clone()], &direction[d][particles.clone()]);
-                let [free, along] = Arch::new().dispatch(Turn { force: g, volumes, direction });
+                let [free, along] = Arch::new().dispatch(EnergyGradient { force: g, volumes, direction });
                 sums.free += free;
                 slope += along;
             }
@@ -160,13 +160,13 @@ pub fn gradient_pass<const D: usize>(
 pub const LANES: usize = 8;
 
 /// F becomes −V F; Σ F², and the sum of −V F along a direction.
-struct Turn<'a> {
+struct EnergyGradient<'a> {
     force: &'a mut [f64],
     volumes: &'a [f64],
     direction: &'a [f64],
 }
 
-impl NullaryFnOnce for Turn<'_> {
+impl NullaryFnOnce for EnergyGradient<'_> {
     type Output = [f64; 2];
     #[inline(always)]
     fn call(self) -> [f64; 2] {
@@ -252,7 +252,7 @@ pub fn move_pass<const D: usize>(
     damping: f64,
 ) {
     let sites = unit_mass.len();
-    let (keep, push) = if state.iteration == 0 {
+    let (keep, push) = if state.counts.iteration == 0 {
         (0.0, 0.5 / mass)
     } else {
         ((2.0 - damping) / (2.0 + damping), 2.0 / (2.0 + damping) / mass)

@@ -4,7 +4,7 @@
 //! own part.
 
 use super::load::Loads;
-use crate::bonds::Bonds;
+use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -31,7 +31,7 @@ pub struct Places {
 
 impl Places {
     /// Of a body and its loads.
-    pub fn new<const D: usize>(bonds: &dyn Bonds<D>, loads: &Loads<D>) -> Self {
+    pub fn new<const D: usize>(bonds: &dyn BodyGeometry<D>, loads: &Loads<D>) -> Self {
         let mut places = Self { first: vec![0], ..Self::default() };
         let particles = bonds.particles();
         let mut next = 0;

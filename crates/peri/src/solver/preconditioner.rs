@@ -6,7 +6,7 @@ use super::mass::{has_own_mass, own_mass, update_unit_mass};
 use super::places::{Places, in_order};
 use super::state::State;
 use super::system::System;
-use crate::bonds::Bonds;
+use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field, chunk_range};
 
 /// Degrees of freedom of the coarse level at most, in two and three dimensions: so many in any body, one for so many particles, and so many
@@ -55,7 +55,7 @@ impl<const D: usize> Preconditioner<D> {
         self.volumes = bonds.particles().iter().map(|&site| bonds.volume(site as usize)).collect();
         update_unit_mass(bonds, bonds.particles(), &mut self.unit_mass);
         let (law, modulus) = system.material.bond_law();
-        let tangent = if own { modulus } else { state.tangent };
+        let tangent = if own { modulus } else { state.stretches.tangent };
         if !own {
             springs.clone_from(&self.unit_mass);
         }
@@ -90,7 +90,7 @@ impl<const D: usize> Preconditioner<D> {
             bonds,
             loads: &system.loads,
             displacement: &state.displacement,
-            law: (law, [modulus, system.material.volumetric()], state.fitted),
+            law: (law, [modulus, system.material.volumetric()], state.stretches.fitted),
             springs: &springs,
             survey: &survey,
             anchors: &anchors,
@@ -101,7 +101,7 @@ impl<const D: usize> Preconditioner<D> {
     }
 
     /// Brings the local part up to date where bonds broke; the coarse one stays.
-    pub fn broke(&mut self, bonds: &dyn Bonds<D>, sites: &[u32]) {
+    pub fn broke(&mut self, bonds: &dyn BodyGeometry<D>, sites: &[u32]) {
         let before: Vec<f64> = sites.iter().map(|&site| self.unit_mass[site as usize]).collect();
         update_unit_mass(bonds, sites, &mut self.unit_mass);
         for (&site, before) in sites.iter().zip(before) {

@@ -2,7 +2,7 @@
 
 use super::load::Loads;
 use super::system::System;
-use crate::bonds::Bonds;
+use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field};
 use crate::geometry::length;
 use rayon::prelude::*;
@@ -93,14 +93,14 @@ type Carrier<'a, const D: usize> = (Option<&'a Turned<D>>, [f64; D], Vec<[f64; D
 
 impl<const D: usize> Loads<D> {
     /// Turns a region whose components are constrained already.
-    pub fn turn(&mut self, bonds: &dyn Bonds<D>, turned: Turned<D>) {
+    pub fn turn(&mut self, bonds: &dyn BodyGeometry<D>, turned: Turned<D>) {
         self.turned.push(turned);
         self.set_rates(bonds, 0.0, 0.0);
     }
 
     /// Has [`Loads::displacement`] of turned regions be the rate of their displacement over the load factor between two factors: the
     /// secant, at one factor the tangent.
-    pub(super) fn set_rates(&mut self, bonds: &dyn Bonds<D>, before: f64, after: f64) {
+    pub(super) fn set_rates(&mut self, bonds: &dyn BodyGeometry<D>, before: f64, after: f64) {
         let Some(field) = self.displacement.as_mut() else { return };
         for turned in &self.turned {
             for &site in &turned.sites {
@@ -118,7 +118,7 @@ impl<const D: usize> Loads<D> {
     }
 
     /// Places turned regions at a load factor.
-    pub(super) fn place_turned(&self, bonds: &dyn Bonds<D>, factor: f64, displacement: &mut Field<D>) {
+    pub(super) fn place_turned(&self, bonds: &dyn BodyGeometry<D>, factor: f64, displacement: &mut Field<D>) {
         for turned in &self.turned {
             for &site in &turned.sites {
                 let moved = turned.displacement(bonds.position(site as usize), factor);
@@ -128,7 +128,7 @@ impl<const D: usize> Loads<D> {
     }
 
     /// The longest arc of turned particles against those that are not, m; of regions turned both ways their sum.
-    pub(super) fn arc(&self, bonds: &dyn Bonds<D>) -> f64 {
+    pub(super) fn arc(&self, bonds: &dyn BodyGeometry<D>) -> f64 {
         let of = |turned: &Turned<D>| {
             let each = turned.sites.iter().map(|&site| turned.rotation.radius(bonds.position(site as usize)));
             each.fold(0.0, f64::max)
@@ -144,7 +144,12 @@ impl<const D: usize> Loads<D> {
 
     /// Moves free particles with the regions of prescribed displacement from a load factor to another, as near regions do: each turns a
     /// particle by a part of its turn, the parts in proportion to 1/distance.
-    pub(super) fn carry(&self, bonds: &dyn Bonds<D>, [before, after]: [f64; 2], displacement: &mut Field<D>) {
+    pub(super) fn carry(
+        &self,
+        bonds: &dyn BodyGeometry<D>,
+        [before, after]: [f64; 2],
+        displacement: &mut Field<D>,
+    ) {
         let increment = after - before;
         let mean = |sites: &[u32]| {
             let mut sum = [0.0; D];

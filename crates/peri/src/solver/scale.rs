@@ -1,8 +1,9 @@
 //! What forces are measured by, and what sums of them a row of history holds.
 
 use super::load::Loads;
-use crate::bonds::Bonds;
+use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field};
+use polycore::numerics::{bounds, ordered_sum};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -24,7 +25,7 @@ pub struct Scale {
 
 impl Scale {
     /// Of a body with its loads; `stiffness` is kθK.
-    pub fn new<const D: usize>(bonds: &dyn Bonds<D>, loads: &Loads<D>, stiffness: f64) -> Self {
+    pub fn new<const D: usize>(bonds: &dyn BodyGeometry<D>, loads: &Loads<D>, stiffness: f64) -> Self {
         let of = |&site: &u32| {
             let mut sum = 0.0;
             bonds.neighbours(site as usize, &mut |bond| sum += 2.0 * stiffness * bond.weight / bond.length);
@@ -32,13 +33,11 @@ impl Scale {
         };
         let sums: Vec<f64> = bonds.particles().par_iter().map(of).collect();
         let mut scale = Self { springs: vec![0.0; bonds.sites()], ..Self::default() };
-        let (mut low, mut high, mut square) = ([f64::INFINITY; D], [f64::NEG_INFINITY; D], 0.0);
+        let [low, high] = bounds(bonds.particles().iter().map(|&site| bonds.position(site as usize)));
+        let mut square = 0.0;
         for (&site, sum) in bonds.particles().iter().zip(sums) {
             let site = site as usize;
             scale.springs[site] = sum;
-            let position = bonds.position(site);
-            low = std::array::from_fn(|d| low[d].min(position[d]));
-            high = std::array::from_fn(|d| high[d].max(position[d]));
             if let Some(prescribed) = loads.displacement.as_ref().filter(|_| loads.constrained(site) != 0) {
                 let moved = prescribed.get(site).iter().map(|x| x * x).sum::<f64>().sqrt();
                 scale.largest = scale.largest.max(moved);
@@ -66,8 +65,7 @@ impl Scale {
             });
             each.sum::<f64>()
         };
-        let parts: Vec<f64> = self.springs.par_chunks(CHUNK).enumerate().map(of).collect();
-        parts.iter().sum::<f64>().sqrt()
+        ordered_sum(self.springs.par_chunks(CHUNK).enumerate().map(of)).sqrt()
     }
 }
 

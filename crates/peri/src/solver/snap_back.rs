@@ -12,22 +12,22 @@ impl<const D: usize> System<'_, D> {
     pub(super) fn lower(&mut self, state: &mut State<D>, shortest: f64) -> bool {
         let at = state.step;
         let factor = self.factors[at];
-        let may = self.snap_back && state.round > 0 && factor.abs() > shortest;
-        if !(may && self.is_overstretched(state.balanced_stretches) && !self.beyond(state).is_empty()) {
+        let may = self.snap_back && state.control.round > 0 && factor.abs() > shortest;
+        if !(may && self.is_overstretched(state.stretches.balanced) && !self.beyond(state).is_empty()) {
             return false;
         }
-        let (least, stretch) = (self.breaking_stretch().unwrap_or(1.0), state.largest_stretch());
+        let (least, stretch) = (self.breaking_stretch().unwrap_or(1.0), state.stretches.largest());
         let margin = 0.5 * shortest / factor.abs();
         let part = (least - 1.0) / (stretch - 1.0) - margin;
-        let part = if state.cuts < BY_STRETCH && part > 0.0 { part.min(1.0 - margin) } else { 0.5 };
-        if state.inserted.binary_search(&at).is_ok() {
-            state.factors[at] = part * factor;
+        let part = if state.control.cuts < BY_STRETCH && part > 0.0 { part.min(1.0 - margin) } else { 0.5 };
+        if state.control.inserted.binary_search(&at).is_ok() {
+            state.control.factors[at] = part * factor;
             self.factors.to_mut()[at] = part * factor;
         } else {
             self.insert(state, &[part * factor]);
         }
-        (state.cuts, state.iteration) = (state.cuts + 1, 0);
-        state.lowered = Some([factor, stretch]);
+        (state.control.cuts, state.counts.iteration) = (state.control.cuts + 1, 0);
+        state.control.lowered = Some([factor, stretch]);
         for &site in self.bonds.particles() {
             let site = site as usize;
             state.displacement.set(site, state.displacement.get(site).map(|u| part * u));
@@ -40,11 +40,11 @@ impl<const D: usize> System<'_, D> {
 
     /// After a step whose load was lowered: puts factors before that of the next one, between which bonds break.
     pub(super) fn raise(&mut self, state: &mut State<D>, shortest: f64) {
-        let Some(above) = state.lowered.take() else { return };
+        let Some(above) = state.control.lowered.take() else { return };
         if state.step == self.factors.len() {
             return;
         }
-        let below = [self.factors[state.step - 1], state.largest_stretch()];
+        let below = [self.factors[state.step - 1], state.stretches.largest()];
         let new = self.around(below, above, shortest);
         self.insert(state, &new);
     }

@@ -2,10 +2,11 @@
 
 use super::criterion::Breaking;
 use super::load::Loads;
-use super::scale::Scale;
+use super::record::Record;
+use super::scale::{Balance, Scale};
 use super::state::State;
-use crate::bonds::{Bonds, Seen, not_finite};
-use crate::contact::{Contact, Grip, Plane, Resting, Touching};
+use crate::bonds::{Bonds, StretchScan, not_finite};
+use crate::contact::{Contact, ContactSummary, Grip, Plane, PlaneReaction};
 use crate::error::Error;
 use crate::field::Field;
 use crate::material::{Material, Response};
@@ -39,17 +40,17 @@ pub struct System<'a, const D: usize> {
     /// Repulsion of particles without a bond, or a look at how they overlap, where wanted.
     pub contact: Option<Contact<D>>,
     /// Stretches, where they have just been looked at.
-    pub(super) seen_stretches: Seen,
+    pub(super) seen_stretches: StretchScan,
     /// What forces out of balance are measured by.
     pub(super) scale: Scale,
     /// The load factor and its rate over the time, s, in explicit dynamics, instead of the ramp.
-    pub course: Option<&'a Course<'a>>,
+    pub course: Option<&'a LoadCurve<'a>>,
     /// What is looked at in every row of the history, see [`Record::seen`](super::Record::seen).
     pub observer: Option<&'a Observer<'a, D>>,
 }
 
 /// Load factor and its rate, 1/s, at a time, s.
-pub type Course<'a> = dyn Fn(f64) -> (f64, f64) + Sync + 'a;
+pub type LoadCurve<'a> = dyn Fn(f64) -> (f64, f64) + Sync + 'a;
 
 /// Numbers of a body in a state, for its history.
 pub type Observer<'a, const D: usize> = dyn Fn(&dyn Bonds<D>, &State<D>) -> Vec<f64> + Sync + 'a;
@@ -84,7 +85,7 @@ impl<'a, const D: usize> System<'a, D> {
             stop_below: 0.0,
             fit_bound: 1e-9,
             contact: None,
-            seen_stretches: Seen::default(),
+            seen_stretches: StretchScan::default(),
             scale: Scale::default(),
             course: None,
             observer: None,
@@ -98,7 +99,7 @@ impl<'a, const D: usize> System<'a, D> {
         if let Some(contact) = self.contact.as_mut().filter(|contact| contact.repels()) {
             contact.update(&*self.bonds, displacement);
         }
-        self.bonds.round(displacement);
+        self.bonds.prepare(displacement);
         self.material.prepare(&*self.bonds, displacement);
     }
 
@@ -116,10 +117,10 @@ impl<'a, const D: usize> System<'a, D> {
         self.set_rates(after, after);
         self.place(before, 0.0);
         self.place(after, 0.0);
-        if let Some(start) = &state.started
+        if let Some(start) = &state.contact.start
             && let Some(contact) = self.contact.as_mut().filter(|contact| contact.rubs())
         {
-            contact.hold(start, state.held.clone());
+            contact.hold(start, state.contact.active.clone());
         }
     }
 
@@ -127,27 +128,29 @@ impl<'a, const D: usize> System<'a, D> {
     /// another equilibrium is to be sought.
     pub(super) fn renew_friction(&mut self, state: &mut State<D>, tolerance: f64) -> bool {
         let Some(contact) = self.contact.as_mut().filter(|contact| contact.rubs()) else { return false };
-        let Some(start) = &state.started else { return false };
-        let mut new = contact.grips(&*self.bonds, &state.displacement, start, &state.grips);
+        let Some(start) = &state.contact.start else { return false };
+        let mut new = contact.grips(&*self.bonds, &state.displacement, start, &state.contact.grips);
         let bound = |grips: &[Grip], pair| {
             grips.binary_search_by_key(&pair, |grip: &Grip| grip.pair).map_or(0.0, |at| grips[at].bound)
         };
-        let lost = state.held.iter().filter(|grip| bound(&new, grip.pair) == 0.0).map(|grip| grip.bound);
-        let changed = new.iter().map(|grip| (grip.bound - bound(&state.held, grip.pair)).abs());
+        let lost =
+            state.contact.active.iter().filter(|grip| bound(&new, grip.pair) == 0.0).map(|grip| grip.bound);
+        let changed = new.iter().map(|grip| (grip.bound - bound(&state.contact.active, grip.pair)).abs());
         let change: f64 = lost.chain(changed).sum();
         let total: f64 = new.iter().map(|grip| grip.bound).sum();
         if change <= tolerance * total {
             return false;
         }
-        if state.renewals >= RENEWALS {
-            state.unconverged += 1;
+        if state.contact.renewals >= RENEWALS {
+            state.counts.unconverged += 1;
             return false;
         }
-        if state.renewals >= ALTERNATING {
-            new.iter_mut().for_each(|grip| grip.bound = 0.5 * (grip.bound + bound(&state.held, grip.pair)));
+        if state.contact.renewals >= ALTERNATING {
+            new.iter_mut()
+                .for_each(|grip| grip.bound = 0.5 * (grip.bound + bound(&state.contact.active, grip.pair)));
         }
         contact.hold(start, new.clone());
-        (state.held, state.renewals) = (new, state.renewals + 1);
+        (state.contact.active, state.contact.renewals) = (new, state.contact.renewals + 1);
         true
     }
 
@@ -159,7 +162,7 @@ impl<'a, const D: usize> System<'a, D> {
     /// What loads and rigid planes pull, see [`Loads::conjugates`].
     pub(super) fn conjugates(&self, state: &State<D>) -> (f64, f64) {
         let (pull, push) = self.loads.conjugates(&*self.bonds, &state.displacement, &state.force);
-        let work = |(plane, resting): (&Plane<D>, &Resting)| {
+        let work = |(plane, resting): (&Plane<D>, &PlaneReaction)| {
             (0..D).map(|d| plane.displacement[d] * resting.force[d]).sum::<f64>()
         };
         let Some(contact) = self.repulsion() else { return (pull, push) };
@@ -175,10 +178,10 @@ impl<'a, const D: usize> System<'a, D> {
     }
 
     /// How the body rests on rigid planes, with friction.
-    pub(super) fn resting(&self, state: &State<D>) -> Vec<Resting> {
+    pub(super) fn resting(&self, state: &State<D>) -> Vec<PlaneReaction> {
         let Some(contact) = self.repulsion() else { return Vec::new() };
         let mut resting = contact.resting(&state.displacement);
-        for (resting, rub) in resting.iter_mut().zip(&state.rubbing) {
+        for (resting, rub) in resting.iter_mut().zip(&state.contact.plane_friction) {
             (0..3).for_each(|d| resting.force[d] += rub[d]);
         }
         resting
@@ -225,7 +228,7 @@ impl<'a, const D: usize> System<'a, D> {
     }
 
     /// What touches in a state, where that is looked at.
-    pub(super) fn touching(&mut self, state: &State<D>) -> Option<Touching> {
+    pub(super) fn touching(&mut self, state: &State<D>) -> Option<ContactSummary> {
         let contact = self.contact.as_mut()?;
         if !contact.has_pairs() {
             contact.rebuild(&*self.bonds, &state.displacement);
@@ -273,10 +276,46 @@ impl<'a, const D: usize> System<'a, D> {
         self.observer.map_or_else(Vec::new, |observer| observer(&*self.bonds, state))
     }
 
+    /// Row of history of a state: at a load factor with its conjugate sums, see [`Loads::conjugates`](super::Loads::conjugates), the stretches
+    /// `observed` and the `stored` energy, J. Not of an equilibrium: without residual and balance.
+    pub(super) fn row(
+        &mut self,
+        state: &State<D>,
+        [factor, pull, push]: [f64; 3],
+        observed: StretchRange,
+        stored: f64,
+    ) -> Record {
+        let (load, displacement) = self.response(factor, (pull, push));
+        Record {
+            factor,
+            load,
+            displacement,
+            reactions: self.loads.reactions(&*self.bonds, &state.force),
+            residual: 0.0,
+            iterations: state.counts.step_iterations,
+            rounds: 1,
+            broken: state.fracture.broken,
+            detached: state.fracture.detached,
+            stored,
+            balance: Balance::default(),
+            contact: self.touching(state),
+            work: state.work,
+            released: state.fracture.released,
+            smallest_stretch: (1.0 + observed.low).max(0.0).sqrt(),
+            largest_stretch: (1.0 + observed.high).sqrt(),
+            time: state.motion.time,
+            kinetic: state.motion.energies.kinetic,
+            damped: state.motion.energies.damped,
+            rubbed: state.motion.energies.rubbed,
+            resting: self.resting(state),
+            seen: self.seen(state),
+        }
+    }
+
     /// Counts one evaluation of all forces.
     pub fn count_evaluation(&self, state: &mut State<D>) {
-        state.evaluations += 1;
-        state.bond_evaluations += self.bonds.directed_bonds();
+        state.counts.evaluations += 1;
+        state.counts.bond_evaluations += self.bonds.directed_bonds();
     }
 
     /// The error that names where a state has ceased to be finite.
@@ -286,7 +325,7 @@ impl<'a, const D: usize> System<'a, D> {
             [("displacement", &state.displacement), ("velocity", &state.velocity), ("force", &state.force)];
         for (quantity, field) in fields {
             if let Some((site, _)) = field.non_finite() {
-                return not_finite(bonds, quantity, site, state.step, state.iteration);
+                return not_finite(bonds, quantity, site, state.step, state.counts.iteration);
             }
         }
         // every entry is finite, their squares are not: the greatest force is to blame
@@ -298,7 +337,7 @@ impl<'a, const D: usize> System<'a, D> {
             particle: greatest.map_or(0, |(particle, _)| particle),
             position: greatest.map_or_else(Vec::new, |(_, &site)| bonds.position(site as usize).to_vec()),
             step: state.step,
-            iteration: state.iteration,
+            iteration: state.counts.iteration,
         }
     }
 }

@@ -1,9 +1,11 @@
 //! The critical time step Δt_c = 2/ω_max of explicit dynamics: a bound for every deformation within a range of stretches,
 //! and the sharp value of one deformation.
 
+use super::motion::BondSums;
 use super::state::State;
 use super::system::System;
 use crate::field::{CHUNK, Field, chunk_range};
+use polycore::numerics::ordered_sum;
 use rayon::prelude::*;
 
 /// Displacement, in shortest bonds, by which the tangent's force differences are taken: truncation and rounding are both
@@ -14,17 +16,6 @@ const PROBE: f64 = 1e-5;
 const ENOUGH: f64 = 1e-2;
 /// Most steps of the Lanczos iteration.
 const MOST_STEPS: usize = 200;
-
-/// What bounds the frequencies of a body, and what its bonds can store at most and least.
-#[derive(Clone, Copy, Debug)]
-pub struct BondSums {
-    /// max_I Σ_J 2 w V_J/|ξ|: the stiffness of a particle's bonds for a unit tangent kθ t′, m.
-    pub stiffness: f64,
-    /// Shortest bond, m; ∞ without bonds.
-    pub shortest: f64,
-    /// Σ_I V_I Σ_J w V_J |ξ|: the energy of all bonds for kθ φ = 1.
-    pub extent: f64,
-}
 
 impl BondSums {
     /// One visit of all bonds.
@@ -189,8 +180,7 @@ fn product_of<const D: usize>(a: &Field<D>, b: &Field<D>, volumes: &[f64]) -> f6
         };
         (0..D).map(of_axis).sum()
     };
-    let parts: Vec<f64> = (0..sites.div_ceil(CHUNK)).into_par_iter().map(of).collect();
-    parts.iter().sum()
+    ordered_sum((0..sites.div_ceil(CHUNK)).into_par_iter().map(of))
 }
 
 fn scale<const D: usize>(field: &mut Field<D>, factor: f64) {

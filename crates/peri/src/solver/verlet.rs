@@ -5,12 +5,12 @@
 //! doi:10.1063/1.442716, Hairer, Lubich & Wanner (2003), doi:10.1017/S0962492902000144. Works are sums of
 //! ½(force before + force after)·Δu, which change ½ρ(v² − ¼Δt²a²) exactly: the energies balance to O(Δt²) without drift.
 
-use super::method::{Finished, Method};
-use super::motion::Motion;
-use super::scale::Balance;
-use super::state::{Record, State, Status, Watch};
+use super::method::{Finished, Method, Watch};
+use super::motion::{BondSums, Energies, Motion, StepLimits, StretchLook};
+use super::record::Status;
+use super::state::State;
 use super::system::System;
-use super::time_step::{BondSums, critical, largest_frequency_squared};
+use super::time_step::{critical, largest_frequency_squared};
 use super::verlet_friction::{friction_pass, plane_pass};
 use super::verlet_step::{Sums, VerletStep, force_pass, kick_pass, leap_pass, refresh, stored, volumes};
 use crate::bonds::{StretchRange, stretch_range};
@@ -87,24 +87,24 @@ impl<const D: usize> Method<D> for VelocityVerlet {
         if state.motion.begun {
             system.place(self.factor(system, state.motion.time).0, state.motion.time);
             system.restore(state)?;
-            system.contact.iter_mut().for_each(|contact| contact.resume(&state.grips));
+            system.contact.iter_mut().for_each(|contact| contact.resume(&state.contact.grips));
         } else {
             self.begin(system, state, &volumes)?;
         }
         while state.step < self.records {
             // the last of them is the end time to the bit
             let end = self.end_time * ((state.step + 1) as f64 / self.records as f64);
-            if state.motion.planned == 0 {
+            if state.motion.steps.planned == 0 {
                 state.motion.plan(end);
             }
-            while state.motion.taken < state.motion.planned {
+            while state.motion.steps.taken < state.motion.steps.planned {
                 self.advance(system, state, &volumes, end)?;
                 watch(&self.status(state), state)?;
             }
             system.check_overlaps(state)?;
             self.record(system, state);
             state.step += 1;
-            (state.iteration, state.step_iterations, state.motion.planned) = (0, 0, 0);
+            (state.counts.iteration, state.counts.step_iterations, state.motion.steps.planned) = (0, 0, 0);
             finished(&*system.bonds, state)?;
         }
         Ok(())
@@ -153,8 +153,8 @@ impl VelocityVerlet {
         let (factor, rate) = self.factor(system, 0.0);
         system.place(factor, 0.0);
         system.set_rates(factor, factor);
-        (state.friction, state.started) = (None, None);
-        (state.rubbing, state.pushing) = (Vec::new(), Vec::new());
+        (state.contact.friction, state.contact.start) = (None, None);
+        (state.contact.plane_friction, state.contact.plane_push) = (Vec::new(), Vec::new());
         for &site in system.bonds.particles() {
             let site = site as usize;
             let constrained = system.loads.constrained(site);
@@ -171,12 +171,12 @@ impl VelocityVerlet {
             return Err(system.not_finite(state));
         }
         // another method may have left it at another displacement
-        state.tangent = 0.0;
+        state.stretches.tangent = 0.0;
         system.restore(state)?;
         system.covers_stretches(state, None)?;
         refresh(system, state, factor, None);
         system.count_evaluation(state);
-        let observed = state.balanced_stretches;
+        let observed = state.stretches.balanced;
         let stored = system.stored_energy(state, observed);
         let square = |site: u32| state.velocity.get(site as usize).iter().map(|v| v * v).sum::<f64>();
         let particles = system.bonds.particles().iter();
@@ -185,28 +185,21 @@ impl VelocityVerlet {
         if state.force.non_finite().is_some() || !(kinetic + stored).is_finite() {
             return Err(system.not_finite(state));
         }
-        state.work = kinetic + stored + state.released;
-        (state.step, state.iteration, state.step_iterations) = (0, 0, 0);
-        let BondSums { stiffness, shortest, extent } = BondSums::new(system);
-        let frequency = largest_frequency_squared(system, state, volumes, self.density, shortest);
+        state.work = kinetic + stored + state.fracture.released;
+        (state.step, state.counts.iteration, state.counts.step_iterations) = (0, 0, 0);
+        let bonds = BondSums::new(system);
+        let frequency = largest_frequency_squared(system, state, volumes, self.density, bonds.shortest);
         let contact = system.repulsion().map_or(0.0, |contact| {
             contact.greatest_stiffness(&*system.bonds, &state.displacement).max(contact.pair_stiffness())
         });
-        state.motion = Motion {
-            contact,
-            critical_step: critical(frequency),
-            kinetic,
-            begun: true,
-            stiffness,
-            shortest,
-            extent,
-            turnover: state.work,
-            ..Motion::default()
-        };
-        if let Some(found) = self.time_step.filter(|&found| found > state.motion.critical_step) {
-            return Err(Error::TimeStep { found, critical: state.motion.critical_step });
+        let limits =
+            StepLimits { critical_step: critical(frequency), contact, bonds, ..StepLimits::default() };
+        let energies = Energies { kinetic, turnover: state.work, ..Energies::default() };
+        state.motion = Motion { begun: true, limits, energies, ..Motion::default() };
+        if let Some(found) = self.time_step.filter(|&found| found > state.motion.limits.critical_step) {
+            return Err(Error::TimeStep { found, critical: state.motion.limits.critical_step });
         }
-        state.motion.see(observed);
+        state.motion.look = StretchLook::new(observed);
         self.know(system, state, frequency);
         self.cover(system, state);
         let rest = VerletStep { step: 0.0, density: self.density, damping: 0.0, factors: [factor; 2], rate };
@@ -218,8 +211,8 @@ impl VelocityVerlet {
 
     /// Notes the sharp frequency of the present stretches in units of the law's tangent there.
     fn know<const D: usize>(&self, system: &mut System<D>, state: &mut State<D>, frequency: f64) {
-        let tangent = system.material.range(state.motion.looked).least_tangent;
-        state.motion.frequency = if frequency > 0.0 { frequency / tangent } else { 0.0 };
+        let tangent = system.material.range(state.motion.look.stretches).least_tangent;
+        state.motion.limits.frequency = if frequency > 0.0 { frequency / tangent } else { 0.0 };
         if system.material.has_points() {
             self.measure(system, state, frequency);
         }
@@ -227,35 +220,36 @@ impl VelocityVerlet {
 
     /// What follows from the stretches that the fitted law covers: bounds of the critical time step and of the energy.
     pub(super) fn cover<const D: usize>(&self, system: &System<D>, state: &mut State<D>) {
-        let (law, modulus) = (system.material.range(state.fitted), system.material.bond_law().1);
+        let (law, modulus) = (system.material.range(state.stretches.fitted), system.material.bond_law().1);
         let motion = &mut state.motion;
         // blocks of the tangent's rows: ω² ≤ ‖A_II‖ + Σ‖A_IJ‖ with ‖t′nn + t/λ(1 − nn)‖ ≤ max(|t′|, |t|/λ);
         // Feingold & Varga (1962), doi:10.2140/pjm.1962.12.1241
-        let contact = 2.0 * motion.contact / self.density;
+        let contact = 2.0 * motion.limits.contact / self.density;
         // the greatest frequency of a sum is no greater than the sum of both (Weyl)
         let [bound, estimate] = if system.material.has_points() {
             motion.pace.squares(self.density).map(|square| square + contact)
         } else {
             [
-                2.0 * (motion.stiffness * state.tangent + motion.contact) / self.density,
-                motion.frequency * law.mean_tangent + contact,
+                2.0 * (motion.limits.bonds.stiffness * state.stretches.tangent + motion.limits.contact)
+                    / self.density,
+                motion.limits.frequency * law.mean_tangent + contact,
             ]
         };
-        motion.gershgorin_step = critical(bound);
+        motion.limits.gershgorin_step = critical(bound);
         // nothing free, or a tangent without a positive frequency: the bound alone
-        motion.covered_step = critical(if estimate > 0.0 { estimate.min(bound) } else { bound });
-        motion.floor = law.least_energy * modulus * motion.extent;
+        motion.limits.covered_step = critical(if estimate > 0.0 { estimate.min(bound) } else { bound });
+        motion.energies.floor = law.least_energy * modulus * motion.limits.bonds.extent;
         // friction follows the normal force, which the tangent of neither has: half of ω²Δt² is left to it
         let part = if system.friction().is_some() { std::f64::consts::FRAC_1_SQRT_2 } else { 1.0 };
-        motion.longest = self.time_step.unwrap_or(part * self.safety * motion.covered_step);
+        motion.limits.longest = self.time_step.unwrap_or(part * self.safety * motion.limits.covered_step);
     }
 
     /// Allows for more contact where more particles touch than so far.
     fn cover_contact<const D: usize>(&self, system: &System<D>, state: &mut State<D>) {
         let Some(contact) = system.repulsion() else { return };
         let greatest = contact.greatest_stiffness(&*system.bonds, &state.displacement);
-        if greatest > state.motion.contact {
-            state.motion.contact = GROWTH * greatest;
+        if greatest > state.motion.limits.contact {
+            state.motion.limits.contact = GROWTH * greatest;
             self.cover(system, state);
         }
     }
@@ -271,19 +265,19 @@ impl VelocityVerlet {
         let before = self.factor(system, state.motion.time).0;
         let (density, damping) = (self.density, self.damping);
         let start = self.follows(system).then(|| (state.displacement.clone(), state.velocity.clone()));
-        let (mut cuts, slack) = (0, state.motion.slack);
+        let (mut cuts, slack) = (0, state.motion.look.slack);
         let (after, leap, first) = loop {
-            let after = state.motion.time_after(end);
+            let after = state.motion.steps.time_after(end);
             let (factor, rate) = self.factor(system, after);
-            let step = state.motion.time_step;
+            let step = state.motion.steps.time_step;
             let leap = VerletStep { step, density, damping, factors: [before, factor], rate };
             // the leap goes to the factor times this, the kick takes its increment
             system.set_rates(0.0, factor);
             let first = leap_pass(&system.loads, state, volumes, &leap);
             system.set_rates(before, factor);
             // two ends, √D components
-            let strain = 2.0 * (D as f64).sqrt() * first.increment / state.motion.shortest;
-            state.motion.slack = slack + strain;
+            let strain = 2.0 * (D as f64).sqrt() * first.increment / state.motion.limits.bonds.shortest;
+            state.motion.look.slack = slack + strain;
             system.place(factor, after);
             system.prepare(&state.displacement);
             let Some((displacement, velocity)) = &start else { break (after, leap, first) };
@@ -298,15 +292,18 @@ impl VelocityVerlet {
             state.motion.plan(end);
         };
         let factor = leap.factors[1];
-        let (friction, rubbing, rubs) =
-            (state.friction.take(), state.rubbing.clone(), system.friction().is_some());
-        let look = state.motion.must_look(state.fitted, system.breaking_stretch());
+        let (friction, rubbing, rubs) = (
+            state.contact.friction.take(),
+            state.contact.plane_friction.clone(),
+            system.friction().is_some(),
+        );
+        let look = state.motion.look.is_due(state.stretches.fitted, system.breaking_stretch());
         let (mut second, observed) = force_pass(system, state, volumes, &leap, look, !look && !rubs);
         system.count_evaluation(state);
         if look {
-            state.observed = state.observed.join(observed);
-            state.motion.see(observed);
-            if state.observed.high.is_finite() && system.widen(state)? {
+            state.stretches.see(observed);
+            state.motion.look = StretchLook::new(observed);
+            if state.stretches.observed.high.is_finite() && system.widen(state)? {
                 refresh(system, state, factor, None);
                 system.count_evaluation(state);
                 self.cover(system, state);
@@ -319,10 +316,8 @@ impl VelocityVerlet {
         plane_pass(system, state, &rubbing);
         let motion = &mut state.motion;
         motion.time = after;
-        motion.taken += 1;
-        state.iteration += 1;
-        state.step_iterations += 1;
-        state.total_iterations += 1;
+        motion.steps.taken += 1;
+        state.counts.iterate();
         self.account(state, first, second)?;
         let broken = look && self.sever(system, state, observed, factor);
         self.cover_contact(system, state);
@@ -331,8 +326,10 @@ impl VelocityVerlet {
             self.follow(system, state, volumes, broken);
         }
         let motion = &mut state.motion;
-        let longer = follows && motion.longest > LONGER * motion.time_step;
-        if (longer || motion.longest < (1.0 - 1e-9) * motion.time_step) && motion.taken < motion.planned {
+        let longer = follows && motion.limits.longest > LONGER * motion.steps.time_step;
+        if (longer || motion.limits.longest < (1.0 - 1e-9) * motion.steps.time_step)
+            && motion.steps.taken < motion.steps.planned
+        {
             motion.plan(end);
         }
         Ok(())
@@ -341,22 +338,22 @@ impl VelocityVerlet {
     /// Energies of a step, and whether they may be.
     fn account<const D: usize>(&self, state: &mut State<D>, first: Sums, second: Sums) -> Result<(), Error> {
         let motion = &mut state.motion;
-        motion.kinetic = second.kinetic;
-        motion.damped += first.damped + second.damped;
+        motion.energies.kinetic = second.kinetic;
+        motion.energies.damped += first.damped + second.damped;
         state.work += first.work + second.work;
-        let gone = state.released + motion.damped + motion.rubbed;
-        let available = state.work - gone - motion.floor;
-        motion.turnover = motion.turnover.max(available).max(gone);
-        let most = available.max(0.0) + EXCESS * motion.turnover;
-        let grown = motion.kinetic > most && state.total_iterations > LENIENT;
-        if grown || !motion.kinetic.is_finite() || !available.is_finite() {
+        let gone = state.fracture.released + motion.energies.damped + motion.energies.rubbed;
+        let available = state.work - gone - motion.energies.floor;
+        motion.energies.turnover = motion.energies.turnover.max(available).max(gone);
+        let most = available.max(0.0) + EXCESS * motion.energies.turnover;
+        let grown = motion.energies.kinetic > most && state.counts.total_iterations > LENIENT;
+        if grown || !motion.energies.kinetic.is_finite() || !available.is_finite() {
             return Err(Error::Unstable {
                 time: motion.time,
-                step: state.total_iterations,
-                kinetic: motion.kinetic,
+                step: state.counts.total_iterations,
+                kinetic: motion.energies.kinetic,
                 available,
-                time_step: motion.time_step,
-                critical: motion.covered_step,
+                time_step: motion.steps.time_step,
+                critical: motion.limits.covered_step,
             });
         }
         Ok(())
@@ -379,17 +376,8 @@ impl VelocityVerlet {
     }
 
     fn status<const D: usize>(&self, state: &State<D>) -> Status {
-        Status {
-            step: state.step,
-            steps: self.records,
-            iteration: state.iteration,
-            residual: 1.0 - state.motion.taken as f64 / state.motion.planned as f64,
-            tolerance: 0.1,
-            load: state.history.last().map(|record| record.load),
-            damping: self.damping,
-            broken: state.broken,
-            restartable: true,
-        }
+        let left = 1.0 - state.motion.steps.taken as f64 / state.motion.steps.planned as f64;
+        Status { residual: left, ..state.status(self.records, 0.1, self.damping, true) }
     }
 
     /// A row of history.
@@ -398,32 +386,8 @@ impl VelocityVerlet {
         system.count_evaluation(state);
         let stored = stored(system, state, observed);
         let (factor, _) = self.factor(system, state.motion.time);
-        let conjugates = system.conjugates(state);
-        let (load, displacement) = system.response(factor, conjugates);
-        let record = Record {
-            factor,
-            load,
-            displacement,
-            reactions: system.loads.reactions(&*system.bonds, &state.force),
-            residual: 0.0,
-            iterations: state.step_iterations,
-            rounds: 1,
-            broken: state.broken,
-            detached: state.detached,
-            stored,
-            balance: Balance::default(),
-            contact: system.touching(state),
-            work: state.work,
-            released: state.released,
-            smallest_stretch: (1.0 + observed.low).max(0.0).sqrt(),
-            largest_stretch: (1.0 + observed.high).sqrt(),
-            time: state.motion.time,
-            kinetic: state.motion.kinetic,
-            damped: state.motion.damped,
-            rubbed: state.motion.rubbed,
-            resting: system.resting(state),
-            seen: system.seen(state),
-        };
-        state.history.push(record);
+        let (pull, push) = system.conjugates(state);
+        let row = system.row(state, [factor, pull, push], observed, stored);
+        state.history.push(row);
     }
 }

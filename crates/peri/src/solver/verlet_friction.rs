@@ -8,6 +8,7 @@ use super::state::State;
 use super::system::System;
 use super::verlet_step::{Two, VerletStep};
 use crate::field::{Field, chunk_range};
+use polycore::numerics::ordered_sum;
 use rayon::prelude::*;
 
 /// Computes friction for the half-step velocities, and adds it to the force; `old` are the forces of friction of the step before. Adds to
@@ -22,9 +23,10 @@ pub fn friction_pass<const D: usize>(
     let Some(contact) = system.contact.as_mut().filter(|contact| contact.rubs()) else { return };
     let sites = volumes.len();
     // what moves at the start has slid as far as it will in the first step
-    let span = if leap.step > 0.0 { leap.step } else { state.motion.longest };
-    let sliding = contact.slide_on(&*system.bonds, &state.displacement, &state.velocity, span, &state.grips);
-    state.grips = contact.active_grips().to_vec();
+    let span = if leap.step > 0.0 { leap.step } else { state.motion.limits.longest };
+    let sliding =
+        contact.slide_on(&*system.bonds, &state.displacement, &state.velocity, span, &state.contact.grips);
+    state.contact.grips = contact.active_grips().to_vec();
     let (contact, velocity, loads) = (&*contact, &state.velocity, &*system.loads);
     let moves = leap.factors[1] - leap.factors[0];
     let work = |chunk: usize, force: &[&mut [f64]; D]| {
@@ -49,18 +51,17 @@ pub fn friction_pass<const D: usize>(
         }
         0.5 * (before + work(chunk, &own))
     };
-    let parts: Vec<f64> =
-        friction.chunks_mut().into_par_iter().zip(state.force.chunks_mut()).enumerate().map(of).collect();
-    let mut taken = -parts.iter().sum::<f64>();
+    let items = friction.chunks_mut().into_par_iter().zip(state.force.chunks_mut()).enumerate();
+    let mut taken = -ordered_sum(items.map(of));
     // what planes drag is work of theirs, not heat
-    taken += work_of_planes(contact.moved(), &state.rubbing, &sliding.planes);
+    taken += work_of_planes(contact.moved(), &state.contact.plane_friction, &sliding.planes);
     if leap.step > 0.0 {
-        state.motion.rubbed += taken - (sliding.stored - state.motion.stuck);
+        state.motion.energies.rubbed += taken - (sliding.stored - state.motion.energies.stuck);
     } else {
         state.work += sliding.stored;
     }
-    state.motion.stuck = sliding.stored;
-    (state.friction, state.rubbing) = (Some(friction), sliding.planes);
+    state.motion.energies.stuck = sliding.stored;
+    (state.contact.friction, state.contact.plane_friction) = (Some(friction), sliding.planes);
 }
 
 /// Adds the work of planes that have moved; `rubbed` is their friction before this step.
@@ -71,9 +72,9 @@ pub fn plane_pass<const D: usize>(system: &System<D>, state: &mut State<D>, rubb
     }
     let resting = contact.resting(&state.displacement);
     let pushing: Vec<[f64; 3]> = resting.iter().map(|plane| plane.force).collect();
-    state.work += work_of_planes(contact.moved(), &state.pushing, &pushing)
-        + work_of_planes(contact.moved(), rubbed, &state.rubbing);
-    state.pushing = pushing;
+    state.work += work_of_planes(contact.moved(), &state.contact.plane_push, &pushing)
+        + work_of_planes(contact.moved(), rubbed, &state.contact.plane_friction);
+    state.contact.plane_push = pushing;
 }
 
 /// Σ ½(force before + force after)·Δ; nothing before the first step.

@@ -4,7 +4,7 @@
 use super::load::Loads;
 use super::state::State;
 use super::system::System;
-use crate::bonds::{Seen, StretchRange};
+use crate::bonds::{StretchRange, StretchScan};
 use crate::field::{CHUNK, chunk_range};
 use rayon::prelude::*;
 
@@ -127,7 +127,7 @@ pub fn force_pass<const D: usize>(
     };
     let (sums, seen): (Vec<Sums>, Vec<Vec<StretchRange>>) =
         force.into_par_iter().zip(velocity).enumerate().map(of).unzip();
-    let seen = Seen { part, ranges: seen.concat() };
+    let seen = StretchScan { part, ranges: seen.concat() };
     let observed = seen.ranges.iter().copied().fold(StretchRange::REST, StretchRange::join);
     system.seen_stretches = seen;
     (sums.into_iter().fold(Sums::default(), Sums::add), observed)
@@ -169,7 +169,7 @@ pub fn refresh<const D: usize>(
         pieces.dedup();
         pieces
     });
-    let (displacement, friction) = (&state.displacement, state.friction.as_ref());
+    let (displacement, friction) = (&state.displacement, state.contact.friction.as_ref());
     let of = |start: usize, mut f: [&mut [f64]; D]| {
         system.internal_force(displacement, start, &mut f, None);
         load(&system.loads, start, factor, &mut f);
@@ -315,7 +315,7 @@ fn free_kick(v: &mut [f64], f: &[f64], volumes: &[f64], push: f64) -> f64 {
 
 /// The energy of material and contact, J; over all stretches that are fitted, so that the law is sampled once a fit.
 pub fn stored<const D: usize>(system: &mut System<D>, state: &State<D>, observed: StretchRange) -> f64 {
-    let [low, high] = state.fitted.map(|stretch| stretch * stretch - 1.0);
+    let [low, high] = state.stretches.fitted.map(|stretch| stretch * stretch - 1.0);
     let inside = observed.low >= low && observed.high <= high;
     system.stored_energy(state, if inside { StretchRange { low, high } } else { observed })
 }

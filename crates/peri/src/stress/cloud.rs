@@ -2,7 +2,7 @@
 
 use super::window::{Window, bond_function};
 use super::{BallVolume, Loaded, Measure, Tensor, ball_volume, force_over_length, segment_fraction};
-use crate::bonds::{Bonds, CellGrid, CloudBonds, Neighbour, Stencil};
+use crate::bonds::{BodyGeometry, CellGrid, CloudBonds, Neighbour, Stencil};
 use pulp::{Arch, NullaryFnOnce};
 use rayon::prelude::*;
 

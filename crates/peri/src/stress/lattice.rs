@@ -5,7 +5,7 @@ use super::convolution::{Shared, Shares, Tap, tiles};
 use super::pull::forces;
 use super::window::{Averaged, Window, normalise};
 use super::{BallVolume, Loaded, Measure, Measured, ball_volume, cell_fractions, segment_fraction};
-use crate::bonds::{Bonds, LatticeBonds};
+use crate::bonds::{BodyGeometry, LatticeBonds};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::time::Instant;

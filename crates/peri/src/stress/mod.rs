@@ -14,7 +14,7 @@ mod window;
 
 pub use ball::{ball_volume, cell_fractions, segment_fraction};
 
-use crate::bonds::{Bonds, CloudBonds, GradientSums, Kind, LatticeBonds};
+use crate::bonds::{BodyGeometry, BondForces, Bonds, CloudBonds, GradientSums, Kind, LatticeBonds};
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::potential::KernelFit;
 use rayon::prelude::*;
@@ -153,7 +153,7 @@ pub struct Loaded<'a, const D: usize> {
 /// Stress of every particle by one of several measures.
 #[derive(Clone, Debug)]
 pub struct Measured<const D: usize> {
-    /// First Piola–Kirchhoff stress, in the order of [`Bonds::particles`], Pa.
+    /// First Piola–Kirchhoff stress, in the order of [`BodyGeometry::particles`], Pa.
     pub piola: Vec<Tensor<D>>,
     /// What this measure alone would have taken. On a lattice that includes the forces of all bonds, which are computed
     /// once for all measures: together they took less than the sum of these seconds.
@@ -180,7 +180,7 @@ pub fn piolas<const D: usize>(
     measures.iter().map(one).collect()
 }
 
-/// First Piola–Kirchhoff stress of every particle (in the order of [`Bonds::particles`]), Pa.
+/// First Piola–Kirchhoff stress of every particle (in the order of [`BodyGeometry::particles`]), Pa.
 pub fn piola<const D: usize>(
     bonds: &dyn Bonds<D>,
     state: &Loaded<D>,
@@ -193,7 +193,7 @@ pub fn piola<const D: usize>(
     }
 }
 
-/// First Piola–Kirchhoff stress of every particle (in the order of [`Bonds::particles`]), Pa, on a lattice.
+/// First Piola–Kirchhoff stress of every particle (in the order of [`BodyGeometry::particles`]), Pa, on a lattice.
 pub fn piola_on_lattice<const D: usize>(
     bonds: &LatticeBonds<D>,
     state: &Loaded<D>,
@@ -206,7 +206,7 @@ pub fn piola_on_lattice<const D: usize>(
     lattice::piolas(bonds, state, &[measure], ball).swap_remove(0).piola
 }
 
-/// First Piola–Kirchhoff stress of every particle (in the order of [`Bonds::particles`]), Pa, in a cloud.
+/// First Piola–Kirchhoff stress of every particle (in the order of [`BodyGeometry::particles`]), Pa, in a cloud.
 ///
 /// A cloud has neither types of bonds nor cells: a measure whose weights sum to 1 shares every bond among the particles whose
 /// windows it crosses, by volume × bond function, so that the sum of P V is that of f ⊗ ξ over all bonds;
@@ -241,26 +241,20 @@ pub(crate) fn force_over_length<const D: usize>(
 /// Nonlocal deformation gradient F = (Σ w ζ ⊗ ξ)(Σ w ξ ⊗ ξ)⁻¹ over the intact bonds (Silling et al. 2007,
 /// doi:10.1007/s10659-007-9125-1); the identity where the bonds do not span space.
 pub fn deformation_gradients<const D: usize>(
-    bonds: &dyn Bonds<D>,
+    bonds: &dyn BondForces<D>,
     displacement: &Field<D>,
 ) -> Vec<Tensor<D>> {
     let particles = bonds.particles();
     // what one work item has of them; `None` where bonds have to be visited one by one
-    let chunks: Option<Vec<Vec<Tensor<D>>>> = bonds.as_lattice().and_then(|lattice| {
-        let chunk = |chunk: usize| {
-            let sums = lattice.gradient_sums(displacement, chunk)?;
-            let sites = chunk_range(chunk, bonds.sites());
-            let [from, to] =
-                [sites.start, sites.end].map(|end| particles.partition_point(|&s| (s as usize) < end));
-            Some(
-                particles[from..to]
-                    .iter()
-                    .map(|&site| gradient(&sums[site as usize - sites.start]))
-                    .collect(),
-            )
-        };
-        (0..bonds.sites().div_ceil(CHUNK)).into_par_iter().map(chunk).collect()
-    });
+    let chunk = |chunk: usize| {
+        let sums = bonds.gradient_sums(displacement, chunk)?;
+        let sites = chunk_range(chunk, bonds.sites());
+        let [from, to] =
+            [sites.start, sites.end].map(|end| particles.partition_point(|&s| (s as usize) < end));
+        Some(particles[from..to].iter().map(|&site| gradient(&sums[site as usize - sites.start])).collect())
+    };
+    let chunks: Option<Vec<Vec<Tensor<D>>>> =
+        (0..bonds.sites().div_ceil(CHUNK)).into_par_iter().map(chunk).collect();
     if let Some(chunks) = chunks {
         return chunks.concat();
     }

@@ -2,7 +2,7 @@
 
 use super::Loaded;
 use super::convolution::lanes;
-use crate::bonds::{Bonds, LatticeBonds, TILE, Weights};
+use crate::bonds::{BodyGeometry, LatticeBonds, TILE, Weights};
 use crate::potential::KernelFit;
 use pulp::{Arch, Simd, WithSimd};
 

@@ -2,7 +2,7 @@
 
 use crate::materials::battery;
 use evidence::near;
-use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
+use peri::bonds::{BodyGeometry, LatticeBonds, VolumeCorrection};
 use peri::field::Field;
 use peri::geometry::{Operation, Shape, lattice};
 use peri::material::{Affine, Family, Material, Pointwise, Response};

@@ -3,7 +3,7 @@
 use crate::bodies::{
     Body, Built, MODULUS, Random, distance, fit, forces, laws, norm, rms, scatter, stretch_range,
 };
-use peri::bonds::{Bonds, CloudBonds, VolumeCorrection};
+use peri::bonds::{BondForces, Bonds, CloudBonds, VolumeCorrection};
 use peri::potential::{KernelFit, Law};
 
 /// Both paths' forces on particles in input order.

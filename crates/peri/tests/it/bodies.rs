@@ -1,6 +1,6 @@
 //! One body in both representations, random displacements, and the plain sums of Eqs (2.6) and (2.47) to compare with.
 
-use peri::bonds::{Bonds, CloudBonds, LatticeBonds, VolumeCorrection, force};
+use peri::bonds::{BodyGeometry, BondForces, Bonds, CloudBonds, LatticeBonds, VolumeCorrection, force};
 use peri::correction::surface_factors;
 use peri::field::Field;
 use peri::geometry::{Cut, Operation, Shape, lattice};

@@ -5,7 +5,10 @@ use crate::materials::checks;
 use crate::solids::{Plain, displaced, neo_hooke, rubber};
 use crate::spectra::{COLLAR, errors, forces};
 use evidence::{at_most, near, within};
-use peri::bonds::{Bonds, CloudBonds, Overstretched, Softened, StretchRange, VolumeCorrection};
+use peri::bonds::{
+    BodyGeometry, BondDamage, BondForces, Bonds, CloudBonds, Overstretched, Softened, StretchRange,
+    VolumeCorrection,
+};
 use peri::calibrate::Space;
 use peri::field::Field;
 use peri::material::{Family, Material, NonlocalSolid, PointLaw, Pointwise, Response, Tensor, relief};
@@ -436,7 +439,7 @@ fn ring_error(n: usize, relieved: bool) -> f64 {
     let method = Lbfgs { tolerance: 1e-6, max_iterations: 5000, ..Default::default() };
     method.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(())).unwrap();
     drop(system);
-    assert_eq!(state.unconverged, 0);
+    assert_eq!(state.counts.unconverged, 0);
     let mut material = Pointwise::new(solid.clone(), &bonds);
     material.prepare(&bonds, &state.displacement);
     let (mut sum, mut count) = (0.0, 0);

@@ -2,7 +2,7 @@
 //! energy, objectivity; bodies pressed together; no list in any bit.
 
 use crate::bodies::{Body, Built, MODULUS, Random, distance, norm, rms, scatter};
-use peri::bonds::{Bonds, CloudBonds, Overstretched, VolumeCorrection};
+use peri::bonds::{BodyGeometry, Bonds, CloudBonds, Overstretched, VolumeCorrection};
 use peri::contact::{Contact, SHORT_RANGE};
 use peri::field::{CHUNK, Field};
 

@@ -1,7 +1,9 @@
 //! Cracks sever whole bonds: against exact arithmetic on whole numbers, wherever tips lie and in whichever order ends are given.
 
 use crate::bodies::{Body, Built, MODULUS, Random, fit, forces, norm, stretch_range};
-use peri::bonds::{Bonds, CloudBonds, Lattice, LatticeBonds, VolumeCorrection};
+use peri::bonds::{
+    BodyGeometry, BondDamage, BondForces, CloudBonds, Lattice, LatticeBonds, VolumeCorrection,
+};
 use peri::geometry::Cut;
 use peri::potential::Law;
 use proptest::prelude::*;

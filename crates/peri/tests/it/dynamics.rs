@@ -2,7 +2,7 @@
 
 use crate::bodies::{Body, MODULUS, Random, hold, norm};
 use peri::Error;
-use peri::bonds::{Bonds, force};
+use peri::bonds::{BodyGeometry, BondForces, Bonds, force};
 use peri::field::Field;
 use peri::material::BondMaterial;
 use peri::potential::{BondPotential, Law};
@@ -40,8 +40,8 @@ fn one_particle() {
         let solver = VelocityVerlet { records: 4, ..VelocityVerlet::new(DENSITY, 8.0) };
         run(&solver, bonds, &*law, &Loads::default(), &mut state).unwrap();
         assert_eq!(state.displacement.get(site), [4.0, -2.0, 16.0]);
-        assert_eq!(state.total_iterations, 4);
-        assert_eq!(state.motion.critical_step, f64::INFINITY);
+        assert_eq!(state.counts.total_iterations, 4);
+        assert_eq!(state.motion.limits.critical_step, f64::INFINITY);
         // and it falls: u = ½bt²/ρ, which the method integrates without error
         let mut force = Field::zeros(bonds.sites());
         force.set(site, [0.0, 3.0, 0.0]);
@@ -123,11 +123,13 @@ fn two_particles() {
             let mut state = start(bonds);
             let step = period / steps;
             run(&once(period, step), bonds, &*law, &Loads::default(), &mut state).unwrap();
-            assert_eq!(state.total_iterations, steps as u64);
+            assert_eq!(state.counts.total_iterations, steps as u64);
             // the sharp critical step is that of the oscillator; differences of forces give it to 1e-9
-            assert!((state.motion.critical_step * omega / 2.0 - 1.0).abs() < 1e-8);
+            assert!((state.motion.limits.critical_step * omega / 2.0 - 1.0).abs() < 1e-8);
             // and Gershgorin's theorem is sharp here, but for what the law's slope changes within the stretches covered
-            assert!((state.motion.gershgorin_step / state.motion.critical_step - 1.0).abs() < 1e-8);
+            assert!(
+                (state.motion.limits.gershgorin_step / state.motion.limits.critical_step - 1.0).abs() < 1e-8
+            );
             // u = v₀/(ω√(1 − ω²Δt²/4)) sin(2n asin(ωΔt/2)); the fitted bond law is good to 1e-9
             let theta = 2.0 * (0.5 * omega * step).asin();
             let exact = 0.01 * step / theta.sin() * (steps * theta).sin();
@@ -155,7 +157,7 @@ fn energies_balance() {
         let mut state = State::new(built.lattice.sites());
         let solver = VelocityVerlet { records: 1, ..VelocityVerlet::new(DENSITY, 1e-9) };
         run(&solver, &mut built.lattice, &*law, &Loads::default(), &mut state).unwrap();
-        state.motion.critical_step
+        state.motion.limits.critical_step
     };
     let balance = |part: f64, breaking: Option<f64>, damping: f64| {
         let mut built = body.build();
@@ -204,7 +206,7 @@ fn energies_balance() {
     }
     for (part, most) in [(0.9, 0.03), (0.45, 0.01)] {
         let (worst, state) = balance(part, Some(1.2), 0.0);
-        assert!(state.broken > 50, "{} broken", state.broken);
+        assert!(state.fracture.broken > 50, "{} broken", state.fracture.broken);
         assert!(worst < most, "{worst}");
     }
 }
@@ -225,7 +227,7 @@ fn conserved(bonds: &dyn Bonds<2>, state: &State<2>) -> Conserved {
         let (u, v, f) = (state.displacement.get(site), state.velocity.get(site), state.force.get(site));
         for d in 0..2 {
             sum.momentum[d] += mass * v[d];
-            let half = 0.5 * state.motion.time_step * f[d] / DENSITY;
+            let half = 0.5 * state.motion.steps.time_step * f[d] / DENSITY;
             sum.kinetic += 0.5 * mass * (v[d] * v[d] - half * half);
         }
         sum.spin += mass * ((x[0] + u[0]) * v[1] - (x[1] + u[1]) * v[0]);
@@ -274,12 +276,12 @@ fn energy_does_not_drift() {
             })
             .unwrap();
         let end = conserved(&*system.bonds, &state);
-        let size = DENSITY * 0.42 * (2.0 * state.motion.kinetic / (DENSITY * 0.42)).sqrt();
+        let size = DENSITY * 0.42 * (2.0 * state.motion.energies.kinetic / (DENSITY * 0.42)).sqrt();
         let moved = norm([end.momentum[0] - start.momentum[0], end.momentum[1] - start.momentum[1]]) / size;
         let turned = (end.spin - start.spin).abs() / (0.5 * size);
         eprintln!(
             "{} steps of {part} critical: momentum {moved:.1e}, spin {turned:.1e}",
-            state.total_iterations
+            state.counts.total_iterations
         );
         // rounding of 1e5 steps adds up as their root, and not more than their number
         assert!(moved < 1e-11 && turned < 1e-11);
@@ -362,7 +364,7 @@ fn rigid_rotation() {
         state.history.iter().map(|r| ((r.kinetic + r.stored) / r.work - 1.0).abs()).fold(0.0, f64::max);
     eprintln!(
         "one free turn in {} steps: momentum {moved:.1e}, spin {turned:.1e}, energy {energy:.1e}, stretch {:.5}",
-        state.total_iterations,
+        state.counts.total_iterations,
         state.history.last().unwrap().largest_stretch
     );
     assert!(moved < 1e-12 && turned < 1e-12 && energy < 1e-5);

@@ -3,7 +3,7 @@
 use crate::bodies::{Body, MODULUS, hold};
 use harness::case::Fault;
 use peri::Error;
-use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
+use peri::bonds::{BodyGeometry, BondDamage, Bonds, LatticeBonds, VolumeCorrection};
 use peri::field::Field;
 use peri::geometry::{Cut, Operation, Shape, lattice};
 use peri::material::BondMaterial;
@@ -77,7 +77,7 @@ fn a_bond_holds_up_to_its_strength() {
         let mut state = State::new(system.bonds.sites());
         let error = method.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(()));
         assert!(matches!(error, Err(Error::NoEquilibrium { torn: true, step: 6, .. })), "{error:?}");
-        assert_eq!((state.history.len(), state.broken), (6, 0));
+        assert_eq!((state.history.len(), state.fracture.broken), (6, 0));
         assert!((state.history[5].load / (0.9 * strength) - 1.0).abs() < 1e-3);
     }
 }
@@ -118,7 +118,7 @@ fn torn_by_a_force() {
         let step = full / f64::from(steps);
         println!("{policy:?}: {:.3} N of {peak:.3} N, a step is {step:.3} N", last.load);
         assert!(last.load < 1.05 * peak && last.load > 0.8 * peak - step, "{} {peak}", last.load);
-        assert_eq!((state.broken, state.step), (last.broken, state.history.len()));
+        assert_eq!((state.fracture.broken, state.step), (last.broken, state.history.len()));
         let largest = bonds
             .particles()
             .iter()
@@ -127,12 +127,12 @@ fn torn_by_a_force() {
         assert!(largest < 32e-3, "{largest} m");
         // and the state is that row: a body as it was built takes its bonds and has its reaction
         let (mut again, _) = strip();
-        state.sever(&mut again).unwrap();
+        state.fracture.restore(&mut again).unwrap();
         let held =
             again.particles().iter().map(|&site| site as usize).filter(|&site| loads.constrained(site) != 0);
         let reaction: f64 = held.map(|site| state.force.get(site)[1] * again.volume(site)).sum();
         assert!((reaction / last.load - 1.0).abs() < 2e-3, "{reaction} {}", last.load);
-        assert_eq!(2 * state.broken, strip().0.directed_bonds() - again.directed_bonds());
+        assert_eq!(2 * state.fracture.broken, strip().0.directed_bonds() - again.directed_bonds());
     }
 }
 
@@ -155,7 +155,7 @@ fn free_bodies_under_forces() {
             (Err(error), Some(axis)) => {
                 assert!(matches!(error, Error::NoEquilibrium { torn: false, .. }), "{error}");
                 assert!(error.to_string().contains(&format!("holds it along {axis}")), "{error}");
-                assert_eq!((state.evaluations, error.exit_code()), (0, 2));
+                assert_eq!((state.counts.evaluations, error.exit_code()), (0, 2));
             }
             (result, missing) => panic!("held {held}: {result:?}, {missing:?}"),
         }
@@ -226,7 +226,7 @@ fn bodies_crushed_through_themselves() {
         let error =
             method.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(())).unwrap_err();
         assert!(matches!(&error, Error::Geometry(said) if said.contains("pass through")), "{error}");
-        assert_eq!((state.evaluations, error.exit_code()), (0, 2));
+        assert_eq!((state.counts.evaluations, error.exit_code()), (0, 2));
     }
     // a field: det F = 1 − 1.3
     let long = Body::<3>::solid([4, 4, 20], 0.1, 3.015).build().lattice;

@@ -112,10 +112,10 @@ fn the_weaker_end_decides() {
         let breaking = Some(Breaking { criterion: field.into(), policy: Policy::AtEquilibrium });
         let state = pulled(bonds, BondMaterial::new(&LinearBond, MODULUS), 0.008, breaking);
         let after = count(bonds);
-        assert_eq!(state.broken > 0, breaks, "{stretch}");
+        assert_eq!(state.fracture.broken > 0, breaks, "{stretch}");
         let lost: u32 = before.iter().zip(&after).map(|(a, b)| a[0] - b[0]).sum();
-        assert_eq!(u64::from(lost), 2 * state.broken);
+        assert_eq!(u64::from(lost), 2 * state.fracture.broken);
         assert!(before.iter().zip(&after).all(|(a, b)| a[1] == b[1]), "a bond between strong ends broke");
-        assert!((state.released > 0.0) == breaks);
+        assert!((state.fracture.released > 0.0) == breaks);
     }
 }

@@ -4,7 +4,7 @@
 use crate::materials::battery;
 use evidence::{at_most, near};
 use nalgebra::Matrix2;
-use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
+use peri::bonds::{BodyGeometry, Bonds, LatticeBonds, VolumeCorrection};
 use peri::calibrate::Space;
 use peri::field::Field;
 use peri::geometry::{Operation, Shape, lattice};
@@ -89,7 +89,7 @@ fn roughness(rows: usize, filter: bool) -> f64 {
     let mut state = State::new(loads.constrained.len());
     let method = Lbfgs { tolerance: 1e-6, max_iterations: 20_000, ..Default::default() };
     method.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(())).unwrap();
-    assert_eq!(state.unconverged, 0, "{rows} rows");
+    assert_eq!(state.counts.unconverged, 0, "{rows} rows");
     let bonds = &*system.bonds;
     points.prepare(bonds, &state.displacement);
     let pressure = |site: usize| {

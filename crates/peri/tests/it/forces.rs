@@ -1,7 +1,7 @@
 //! The lattice path, the cloud path and a plain loop over all pairs give the same forces.
 
 use crate::bodies::{Body, Random, distance, fit, forces, laws, norm, rms, scatter, stretch_range};
-use peri::bonds::{Bonds, force};
+use peri::bonds::{BodyGeometry, BondDamage, BondForces, Bonds, force};
 use peri::field::Field;
 use peri::potential::{KernelFit, StretchRange};
 
@@ -34,7 +34,7 @@ fn in_mixed_precision<const D: usize>(
     bonds.set_mixed();
     bonds.set_law(fit, crate::bodies::MODULUS);
     let displacement = scatter(bonds.sites(), &built.on_lattice, u);
-    bonds.round(&displacement);
+    bonds.prepare(&displacement);
     in_pieces(&bonds, &displacement);
     let mixed = forces(&bonds, &built.on_lattice, u);
     let unit = f64::from(f32::EPSILON);
@@ -76,8 +76,8 @@ fn compare<const D: usize>(body: &Body<D>, size: f64, name: &str) {
         in_pieces(&built.lattice, &scatter(built.lattice.sites(), &built.on_lattice, &u));
         let in_cloud = forces(&built.cloud, &built.in_cloud, &u);
         // with a copy of the displacement, not of the one before, every bit is the same
-        copied.round(&Field::zeros(built.points.len()));
-        copied.round(&scatter(built.points.len(), &built.in_cloud, &u));
+        copied.prepare(&Field::zeros(built.points.len()));
+        copied.prepare(&scatter(built.points.len(), &built.in_cloud, &u));
         assert_eq!(in_cloud, forces(&copied, &built.in_cloud, &u), "{name}, {}", law.name());
         let scale = rms(&on_lattice);
         // sums of up to 200 terms and a law of up to 25 coefficients, each rounded in another order: 1e-12 ≈ 5e3 ε
@@ -138,7 +138,7 @@ fn limits_of_mixed_precision() {
         bonds.set_law(&KernelFit::new(&*law, range, 1e-6).unwrap(), crate::bodies::MODULUS);
         let moved: Vec<[f64; 3]> = u.iter().map(|u| u.map(|x| x + 0.1 * way)).collect();
         let displacement = scatter(bonds.sites(), &built.on_lattice, &moved);
-        bonds.round(&displacement);
+        bonds.prepare(&displacement);
         bonds.mixed_error(&displacement).unwrap()
     };
     // displacements of 2 % of the spacing, which differ by as much

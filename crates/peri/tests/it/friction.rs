@@ -3,7 +3,7 @@
 use crate::bodies::{Body, MODULUS, Random, Slit, hold, norm};
 use crate::dynamics::DENSITY;
 use peri::Error;
-use peri::bonds::{Bonds, CloudBonds, VolumeCorrection};
+use peri::bonds::{BodyGeometry, Bonds, CloudBonds, VolumeCorrection};
 use peri::contact::{Contact, Plane, SHORT_RANGE};
 use peri::field::{CHUNK, Field};
 use peri::material::BondMaterial;

@@ -2,7 +2,7 @@
 //! the definitions written out here.
 
 use crate::bodies::{Body, Built, MODULUS, Pair, Random, fit, norm, scatter, stretch_range};
-use peri::bonds::{Bonds, Overstretched};
+use peri::bonds::{BodyGeometry, BondDamage, BondForces, Overstretched};
 use peri::geometry::{Operation, Shape};
 use peri::potential::{BondPotential, KernelFit, Law};
 use peri::stress::{BallVolume, Loaded, Measure, Missing, Tensor};

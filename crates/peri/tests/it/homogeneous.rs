@@ -1,7 +1,7 @@
 //! Homogeneous strains through the whole chain of lattice, law, relaxation and stress.
 
 use crate::bodies::{Body, Built, Random, fit, hold, relax};
-use peri::bonds::{Bonds, Stencil};
+use peri::bonds::{BodyGeometry, Bonds, Stencil};
 use peri::calibrate::{Space, modulus};
 use peri::exact::lattice_uniaxial;
 use peri::potential::{BondPotential, Law};
@@ -30,7 +30,7 @@ fn check_affine<const D: usize>(cells: [usize; D], name: &str) {
         let mut state = State::new(bonds.sites());
         relax(&solver, bonds, (&*law, 1.0), &loads, &[0.5, 1.0], &mut state).unwrap();
         // the affine predictor is the solution: nothing is left to iterate, but for rounding
-        assert_eq!(state.total_iterations, 0, "{name}, {path}");
+        assert_eq!(state.counts.total_iterations, 0, "{name}, {path}");
         assert!(farthest(&state, bonds) < 1e-14, "{name}, {path}: {:.1e}", farthest(&state, bonds));
         // from a start that is off by a fifth of the spacing everywhere
         let mut state = State::new(bonds.sites());
@@ -44,8 +44,12 @@ fn check_affine<const D: usize>(cells: [usize; D], name: &str) {
         assert!(error < 1e-8, "{name}, {path}: off by {error:.1e}");
         // longest wave of 2·cells spacings: √(ω_max/ω_min) ≈ cells, e-folds of 1e-8: 18
         let most = 18 * cells.iter().max().copied().unwrap_or(0) as u64;
-        assert!(state.total_iterations < most, "{name}, {path}: {} iterations", state.total_iterations);
-        eprintln!("{name}, {path}: {} iterations, off by {error:.1e}", state.total_iterations);
+        assert!(
+            state.counts.total_iterations < most,
+            "{name}, {path}: {} iterations",
+            state.counts.total_iterations
+        );
+        eprintln!("{name}, {path}: {} iterations, off by {error:.1e}", state.counts.total_iterations);
     }
 }
 
@@ -70,7 +74,7 @@ fn a_sheet_between_rollers_is_in_uniaxial_stress() {
         let loads = hold(&built.lattice, |x| grip(x).then(|| (1, [(stretch - 1.0) * x[0], 0.0])));
         let mut state = State::new(built.lattice.sites());
         relax(&solver, &mut built.lattice, (&*law, modulus), &loads, &[0.3, 0.6, 1.0], &mut state).unwrap();
-        let fit = fit(&*law, state.fitted);
+        let fit = fit(&*law, state.stretches.fitted);
         let loaded =
             Loaded { displacement: &state.displacement, fit: &fit, modulus, missing: Missing::Bonds };
         let stress = piola_on_lattice(&built.lattice, &loaded, Measure::OnePoint, BallVolume::Whole);
@@ -134,7 +138,7 @@ fn a_block_between_rollers_is_in_uniaxial_stress() {
     };
     let mut state = State::new(built.lattice.sites());
     relax(&solver, &mut built.lattice, (&*law, modulus), &loads, &[1.0], &mut state).unwrap();
-    let fit = fit(&*law, state.fitted);
+    let fit = fit(&*law, state.stretches.fitted);
     let loaded = Loaded { displacement: &state.displacement, fit: &fit, modulus, missing: Missing::Bonds };
     let stress = piola_on_lattice(&built.lattice, &loaded, Measure::OnePoint, BallVolume::Whole);
     let middle = built.points.iter().position(|x| *x == [40.5, 7.5, 7.5]).unwrap();
@@ -143,7 +147,7 @@ fn a_block_between_rollers_is_in_uniaxial_stress() {
     let [nominal, lateral] = block_stress(&*law, ratio, along, across).map(|s| s * modulus);
     eprintln!(
         "block: {p:?} against {nominal} {lateral} at {along} {across} {depth}, {} iterations",
-        state.total_iterations
+        state.counts.total_iterations
     );
     assert!((across - depth).abs() < 1e-9);
     // the edges' disturbance, seven rows away, is a third of a percent of the stress and all but affine over one family

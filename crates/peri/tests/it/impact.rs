@@ -3,7 +3,7 @@
 use crate::bodies::{Body, MODULUS, Slit, hold};
 use crate::dynamics::DENSITY;
 use peri::Error;
-use peri::bonds::{Bonds, CloudBonds, VolumeCorrection};
+use peri::bonds::{BodyGeometry, Bonds, CloudBonds, VolumeCorrection};
 use peri::contact::{Contact, SHORT_RANGE};
 use peri::material::BondMaterial;
 use peri::potential::Law;
@@ -124,7 +124,7 @@ fn newtons_cradle() {
             "two bars of {particles}: {velocities:.4?}, momentum {:.1e}, energy {:.1e}, {} steps",
             momentum - 1.0,
             energy_error(&state),
-            state.total_iterations
+            state.counts.total_iterations
         );
         // rounding of thousands of steps
         assert!((momentum - 1.0).abs() < 1e-12);
@@ -175,7 +175,7 @@ fn neither_threads_nor_restarts_change_a_bit() {
         })
     };
     let (one, saved) = run(1, None);
-    eprintln!("askew: {:?}, {} steps", one.history[1].contact, one.total_iterations);
+    eprintln!("askew: {:?}, {} steps", one.history[1].contact, one.counts.total_iterations);
     assert!(one.displacement.sites() > peri::field::CHUNK && one.history[1].contact.unwrap().pairs > 20);
     // == of all fields and histories: no −0 and no NaN are here
     assert!(run(3, None).0 == one && run(2, Some(saved)).0 == one);
@@ -191,7 +191,7 @@ fn energy_through_an_impact() {
                 let motion = state.motion;
                 // twice the stiffest pair's
                 let contact = 2.0 * kappa * 6.0 * MODULUS / 1.015 / DENSITY;
-                assert!(motion.covered_step < 2.0 / contact.sqrt(), "{motion:?}");
+                assert!(motion.limits.covered_step < 2.0 / contact.sqrt(), "{motion:?}");
                 energy_error(&state)
             })
             .to_vec();

@@ -3,7 +3,7 @@
 use crate::bodies::{Body, Built, MODULUS, distance, hold, rms};
 use crate::load_steps::dent;
 use peri::Error;
-use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
+use peri::bonds::{BodyGeometry, Bonds, LatticeBonds, VolumeCorrection};
 use peri::calibrate::{Space, modulus};
 use peri::field::Field;
 use peri::geometry::{Operation, Shape, lattice};
@@ -105,21 +105,21 @@ fn plate_with_a_hole() {
         let fast = problem.minimised(&mut plate.bonds, 1e-5);
         let middle = start.elapsed().as_secs_f64();
         let slow = problem.relaxed(&mut plate.bonds, 1e-5);
-        let ratio = slow.bond_evaluations as f64 / fast.bond_evaluations as f64;
+        let ratio = slow.counts.bond_evaluations as f64 / fast.counts.bond_evaluations as f64;
         eprintln!(
             "plate, dx = {spacing}: {} and {} force evaluations, a factor of {ratio:.1}; {middle:.2} and {:.2} s",
-            fast.evaluations,
-            slow.evaluations,
+            fast.counts.evaluations,
+            slow.counts.evaluations,
             start.elapsed().as_secs_f64() - middle
         );
-        assert!(fast.residual <= 1e-5);
+        assert!(fast.convergence.residual <= 1e-5);
         // the residual over the lowest eigenvalue (π/L)²: 1e-5 of the load is 1e-3 of the displacement at most
         let apart = apart(&plate.bonds, &fast, &slow);
         assert!(apart < 1e-3, "dx = {spacing}: {apart:.1e}");
         // measured: 18 to 20
-        assert!(fast.evaluations <= 30, "dx = {spacing}: {} evaluations", fast.evaluations);
+        assert!(fast.counts.evaluations <= 30, "dx = {spacing}: {} evaluations", fast.counts.evaluations);
         assert!(ratio > if spacing < 6e-3 { 30.0 } else { 15.0 }, "dx = {spacing}: {ratio}");
-        counts.push(fast.evaluations);
+        counts.push(fast.counts.evaluations);
     }
 }
 
@@ -151,13 +151,13 @@ fn same_equilibrium_as_relaxation() {
                 let name = format!("{D}D, {}, cloud: {cloud}", law.name());
                 eprintln!(
                     "{name}: {} and {} evaluations in two steps, {apart:.1e} apart",
-                    slow.evaluations, fast.evaluations
+                    slow.counts.evaluations, fast.counts.evaluations
                 );
                 // residual 1e-7 over the softest mode
                 assert!(apart < 1e-5, "{name}: {apart:.1e}");
                 let pulls = [&slow, &fast].map(|state| state.history[1].load);
                 assert!((pulls[0] / pulls[1] - 1.0).abs() < 1e-6, "{name}: {pulls:?}");
-                assert!(fast.evaluations <= most, "{name}: {} evaluations", fast.evaluations);
+                assert!(fast.counts.evaluations <= most, "{name}: {} evaluations", fast.counts.evaluations);
             }
         }
     }
@@ -182,8 +182,8 @@ fn dent_through_breaking() {
         let rounds: u64 = state.history.iter().map(|r| r.rounds).sum();
         eprintln!(
             "dent, dx = {spacing}: {} evaluations, {rounds} rounds, {} broken, {:.1} s: {loads:?}",
-            state.evaluations,
-            state.broken,
+            state.counts.evaluations,
+            state.fracture.broken,
             start.elapsed().as_secs_f64()
         );
         states.push(state);
@@ -192,12 +192,12 @@ fn dent_through_breaking() {
     let peak = |state: &State<2>| state.history.iter().map(|r| r.load).fold(0.0, f64::max);
     // the same bonds break until the peak; behind it a crack may choose another of equal ways
     assert!((peak(fast) / peak(slow) - 1.0).abs() < 0.01, "{} {}", peak(fast), peak(slow));
-    assert!(fast.broken > 0 && slow.broken > 0);
+    assert!(fast.fracture.broken > 0 && slow.fracture.broken > 0);
     for (a, b) in slow.history.iter().zip(&fast.history).take_while(|(a, _)| a.load < peak(slow)) {
         assert!((a.load / b.load - 1.0).abs() < 1e-3, "{} {}", a.load, b.load);
         assert_eq!(a.broken, b.broken);
     }
-    let ratio = slow.bond_evaluations as f64 / fast.bond_evaluations as f64;
+    let ratio = slow.counts.bond_evaluations as f64 / fast.counts.bond_evaluations as f64;
     assert!(ratio > 2.0, "{ratio}");
 }
 
@@ -214,7 +214,7 @@ fn bits_do_not_depend_on_threads() {
             let mut problem = Problem::new(&*law, 1.0, &loads, &[0.5, 1.0]);
             problem.breaking = Some(Breaking { criterion: 1.5.into(), policy: Policy::AtEquilibrium });
             let mut state = problem.minimised(bonds, 1e-3);
-            assert!(bonds.sites() > 3 * peri::field::CHUNK && state.broken > 0);
+            assert!(bonds.sites() > 3 * peri::field::CHUNK && state.fracture.broken > 0);
             state.history.clear();
             state
         })
@@ -263,15 +263,15 @@ fn restarts(refine: usize, snap_back: bool) {
     let (built, _) = build();
     let (mut whole, mut saved) = (State::new(built.lattice.sites()), Vec::new());
     run(&mut whole, &mut saved);
-    eprintln!("{} broken, {} restartable moments", whole.broken, saved.len());
-    assert!(saved.len() >= 4 && whole.broken > 0);
-    let is_cut = (1..=whole.history.len()).any(|rows| whole.prescribed(rows).is_none());
+    eprintln!("{} broken, {} restartable moments", whole.fracture.broken, saved.len());
+    assert!(saved.len() >= 4 && whole.fracture.broken > 0);
+    let is_cut = (1..=whole.history.len()).any(|rows| whole.control.prescribed(rows).is_none());
     assert_eq!(is_cut, refine > 1);
     assert_eq!(whole.history.windows(2).any(|rows| rows[1].factor < rows[0].factor), snap_back);
     // a long path restarts from a few places
     let every = saved.len().div_ceil(8);
     for mut state in saved.into_iter().step_by(every) {
-        let (step, round, iteration) = (state.step, state.round, state.iteration);
+        let (step, round, iteration) = (state.step, state.control.round, state.counts.iteration);
         run(&mut state, &mut Vec::new());
         assert!(state == whole, "from step {step}, round {round}, iteration {iteration}");
     }
@@ -290,8 +290,11 @@ fn unstable_and_loose_bodies() {
     });
     let problem = Problem::new(&*law, MODULUS, &loads, &[0.25, 0.5, 0.75, 1.0]);
     let state = problem.minimised(&mut strip.lattice, 1e-6);
-    eprintln!("buckling: {} iterations, {} evaluations", state.total_iterations, state.evaluations);
-    assert!(state.evaluations < 3000, "{}", state.evaluations);
+    eprintln!(
+        "buckling: {} iterations, {} evaluations",
+        state.counts.total_iterations, state.counts.evaluations
+    );
+    assert!(state.counts.evaluations < 3000, "{}", state.counts.evaluations);
     // two halves and a particle by themselves, one half unheld; a hinge of one particle between two blocks
     let block = |x: f64, cells: f64| Operation::Add(Shape::Box { min: [x, 0.0], max: [x + cells, 8.0] });
     let dot = |x: f64| Operation::Add(Shape::Box { min: [x, 4.0], max: [x + 1.0, 5.0] });
@@ -306,8 +309,11 @@ fn unstable_and_loose_bodies() {
         });
         let problem = Problem::new(&*law, 1.0, &loads, &[0.5, 1.0]);
         let state = problem.minimised(&mut bonds, 1e-6);
-        eprintln!("{name}: {} iterations, {} evaluations", state.total_iterations, state.evaluations);
-        assert!(state.evaluations < 400, "{name}: {}", state.evaluations);
+        eprintln!(
+            "{name}: {} iterations, {} evaluations",
+            state.counts.total_iterations, state.counts.evaluations
+        );
+        assert!(state.counts.evaluations < 400, "{name}: {}", state.counts.evaluations);
     }
 }
 
@@ -320,12 +326,12 @@ fn past_the_greatest_force() {
     let (mut built, end) = damaged([24, 20]);
     let loads = hold(&built.lattice, |x| (x[0] < 0.375 || x[0] > end).then(|| (3, [0.2 * x[0], 0.0])));
     let state = Problem::new(&*law, MODULUS, &loads, &[0.5, 1.0]).minimised(&mut built.lattice, 1e-4);
-    let stretch = (1.0 + state.observed.high).sqrt();
+    let stretch = (1.0 + state.stretches.observed.high).sqrt();
     eprintln!(
         "{} iterations, {} evaluations, stretches to {stretch:.2}",
-        state.total_iterations, state.evaluations
+        state.counts.total_iterations, state.counts.evaluations
     );
-    assert!(stretch > 1.6 && state.residual <= 1e-4, "{stretch} {}", state.residual);
+    assert!(stretch > 1.6 && state.convergence.residual <= 1e-4, "{stretch} {}", state.convergence.residual);
 }
 
 /// As dynamic relaxation in `limits.rs`: one particle, two, all constrained, a load that nothing bears, numbers that are none.
@@ -355,7 +361,7 @@ fn smallest_bodies_and_errors() {
     let mut body = Body::<2>::solid([9, 7], 0.125, 3.015).build();
     let loads = hold(&body.lattice, |x| Some((3, [0.1 * x[0], 0.0])));
     let state = Problem::new(&*law, 1.0, &loads, &[0.5, 1.0]).minimised(&mut body.lattice, 1e-12);
-    assert_eq!(state.total_iterations, 0);
+    assert_eq!(state.counts.total_iterations, 0);
     // a body force on a particle without bonds has no equilibrium
     let mut one = Body::<2>::solid([1, 1], 0.125, 3.015).build();
     let mut force = Field::zeros(one.lattice.sites());
@@ -392,13 +398,13 @@ fn error_against_work() {
         let slow = problem.relaxed(&mut plate.bonds, tolerance);
         eprintln!(
             "residual {tolerance:.0e}: {} and {} force evaluations",
-            fast.evaluations, slow.evaluations
+            fast.counts.evaluations, slow.counts.evaluations
         );
         rows.push(fast);
     }
     // every two digits cost about the same
     let best = rows.pop().unwrap();
-    assert!(best.evaluations < 60, "{}", best.evaluations);
+    assert!(best.counts.evaluations < 60, "{}", best.counts.evaluations);
     let errors: Vec<f64> = rows.iter().map(|state| apart(&plate.bonds, &best, state)).collect();
     assert!(errors.windows(2).all(|pair| pair[1] < 0.1 * pair[0]), "{errors:?}");
 }

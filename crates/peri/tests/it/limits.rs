@@ -2,7 +2,9 @@
 
 use crate::bodies::{Body, MODULUS, Random, distance, forces, hold, norm, relax, rms};
 use peri::Error;
-use peri::bonds::{Bonds, CloudBonds, Lattice, LatticeBonds, VolumeCorrection};
+use peri::bonds::{
+    BodyGeometry, BondDamage, BondForces, Bonds, CloudBonds, Lattice, LatticeBonds, VolumeCorrection,
+};
 use peri::calibrate::{Space, modulus};
 use peri::field::Field;
 use peri::geometry::{Operation, Shape, lattice};
@@ -242,7 +244,7 @@ fn results_scale_with_length_and_modulus() {
         let mut state = State::new(built.lattice.sites());
         relax(&solver, &mut built.lattice, (&*law, modulus), &loads, &[1.0], &mut state).unwrap();
         let u = built.on_lattice.iter().map(|&s| state.displacement.get(s).map(|x| x / length)).collect();
-        (u, state.total_iterations)
+        (u, state.counts.total_iterations)
     }
     fn check<const D: usize>(cells: [usize; D]) {
         let (plain, iterations) = solve(cells, 1.0, 1.0);
@@ -346,9 +348,17 @@ fn strong_compression_of_the_network_law() {
             Err(Error::NotConverged { residual, .. }) if to < 0.5 && residual < 1.0 => {}
             Err(error) => panic!("to {to}: {error}"),
         }
-        let (low, high) = ((1.0 + state.observed.low).sqrt(), (1.0 + state.observed.high).sqrt());
-        eprintln!("chain to {to}: stretches {low:.3} to {high:.3}, {} iterations", state.total_iterations);
-        assert!(state.fitted[0] <= low && high <= state.fitted[1], "{:?} {low} {high}", state.fitted);
+        let (low, high) =
+            ((1.0 + state.stretches.observed.low).sqrt(), (1.0 + state.stretches.observed.high).sqrt());
+        eprintln!(
+            "chain to {to}: stretches {low:.3} to {high:.3}, {} iterations",
+            state.counts.total_iterations
+        );
+        assert!(
+            state.stretches.fitted[0] <= low && high <= state.stretches.fitted[1],
+            "{:?} {low} {high}",
+            state.stretches.fitted
+        );
     }
 }
 
@@ -366,7 +376,7 @@ fn a_leap_ends_where_steps_end() {
         let mut state = State::new(built.lattice.sites());
         relax(&solver, &mut built.lattice, (&*law, 1.0), &loads, &factors, &mut state).unwrap();
         let u: Vec<[f64; 2]> = built.on_lattice.iter().map(|&s| state.displacement.get(s)).collect();
-        eprintln!("{steps} steps: {} iterations", state.total_iterations);
+        eprintln!("{steps} steps: {} iterations", state.counts.total_iterations);
         ends.push(u);
     }
     // both within the relaxation's tolerance of one equilibrium

@@ -1,7 +1,7 @@
 //! Load steps that are cut where bonds break, and loads that follow a response which snaps back.
 
 use crate::bodies::hold;
-use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
+use peri::bonds::{BodyGeometry, LatticeBonds, VolumeCorrection};
 use peri::calibrate::{Space, modulus};
 use peri::geometry::{Cut, Operation, Shape, lattice};
 use peri::material::BondMaterial;
@@ -58,11 +58,12 @@ fn cut_steps_find_what_short_ones_do() {
     };
     let ((load, place), (wanted, at)) = (peak(&cut), peak(&short));
     assert!((place - at).abs() < step && (load / wanted - 1.0).abs() < step, "{load} {wanted} {place} {at}");
-    assert_eq!(cut.broken, short.broken);
+    assert_eq!(cut.fracture.broken, short.fracture.broken);
     // every prescribed step is there, and no more than a few others
-    let prescribed: Vec<usize> = (1..=cut.history.len()).filter_map(|rows| cut.prescribed(rows)).collect();
+    let prescribed: Vec<usize> =
+        (1..=cut.history.len()).filter_map(|rows| cut.control.prescribed(rows)).collect();
     assert!(prescribed.iter().copied().eq(1..=prescribed.len()) && prescribed.len() > 3, "{prescribed:?}");
-    let iterations = [cut.total_iterations, short.total_iterations];
+    let iterations = [cut.counts.total_iterations, short.counts.total_iterations];
     assert!(
         2 * iterations[0] < iterations[1] && cut.history.len() < 60,
         "{iterations:?} {}",
@@ -104,15 +105,18 @@ fn snap_back_follows_equilibria() {
             }
         });
     }
-    assert_eq!(state.broken, crossing.0);
+    assert_eq!(state.fracture.broken, crossing.0);
     // a bond breaks up to 1¼ shortest steps late, at about half of the full load, and its energy grows with the load's square
-    let beyond = state.released / crossing.1 - 1.0;
-    assert!((0.0..4e-3).contains(&beyond), "{} J of {} J", state.released, crossing.1);
+    let beyond = state.fracture.released / crossing.1 - 1.0;
+    assert!((0.0..4e-3).contains(&beyond), "{} J of {} J", state.fracture.released, crossing.1);
     // breaking at a held displacement adds no work: what is damped never falls, but for the trapezoidal rule of an elastic step
     let damped: Vec<f64> = state.history.iter().map(|row| row.work - row.stored - row.released).collect();
     let least = damped.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::min);
     assert!(least > -1e-3 * state.work, "{least} J of {} J", state.work);
     // what was loaded to a peak at once is unloaded to where it parts
     let last = state.history.last().unwrap();
-    assert!(last.factor < 0.25 && last.stored < 1e-6 * state.work && state.work > state.released, "{last:?}");
+    assert!(
+        last.factor < 0.25 && last.stored < 1e-6 * state.work && state.work > state.fracture.released,
+        "{last:?}"
+    );
 }

@@ -4,9 +4,9 @@
 use crate::bodies::{Body, Built, MODULUS, Random, laws, scatter};
 use crate::linear_solid::{LinearSolid, poisson_ratio};
 use evidence::near;
-use peri::bonds::{Bonds, Overstretched};
+use peri::bonds::{BodyGeometry, Bonds, Overstretched};
 use peri::field::Field;
-use peri::material::{BondMaterial, Cover, Material, Pointwise, Response};
+use peri::material::{BondMaterial, LawCover, Material, Pointwise, Response};
 use peri::solver::{
     Breaking, DynamicRelaxation, Lbfgs, Method, Policy, State, Status, System, VelocityVerlet,
 };
@@ -25,7 +25,7 @@ struct Case<'a, 'm, const D: usize> {
 impl<'a, 'm, const D: usize> Case<'a, 'm, D> {
     fn new(name: String, bonds: &'a mut dyn Bonds<D>, make: Make<'m, D>, displacement: Field<D>) -> Self {
         let mut material = make(bonds);
-        let cover = Cover { stretches: [0.7, 1.5], bound: 1e-10, clamped: false, known: None };
+        let cover = LawCover { stretches: [0.7, 1.5], bound: 1e-10, clamped: false, known: None };
         material.cover(bonds, &displacement, &cover).unwrap();
         Self { name, bonds, material, displacement }
     }
@@ -401,7 +401,7 @@ fn bits_do_not_depend_on_threads() {
 #[test]
 fn methods_agree_on_a_state_based_material() {
     let [a, b] = [Scheme::Relaxation, Scheme::Lbfgs].map(|method| pulled(method, 1e-6, 2));
-    println!("iterations: relaxation {}, L-BFGS {}", a.total_iterations, b.total_iterations);
+    println!("iterations: relaxation {}, L-BFGS {}", a.counts.total_iterations, b.counts.total_iterations);
     let (stored, other) = (a.history[0].stored, b.history[0].stored);
     // both are within (tolerance × condition)² of the least energy
     assert!((stored / other - 1.0).abs() < 1e-7, "{stored} {other}");
@@ -470,11 +470,11 @@ fn a_state_based_material_tears() {
         // what is lost between two equilibria while bonds are gone already is never gained
         let held = last.stored + last.released + last.kinetic;
         assert!(held <= last.work * 1.02, "{moving}: {held} of {}", last.work);
-        let begun: Vec<&State<2>> = saved.iter().filter(|state| state.total_iterations > 0).collect();
+        let begun: Vec<&State<2>> = saved.iter().filter(|state| state.counts.total_iterations > 0).collect();
         assert!(!begun.is_empty());
         for state in begun.into_iter().rev().take(6) {
             let again = run(moving, Some(state), &mut Vec::new());
-            assert!(again == whole, "{moving}: from step {}, round {}", state.step, state.round);
+            assert!(again == whole, "{moving}: from step {}, round {}", state.step, state.control.round);
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::linear_solid::LinearSolid;
 use peri::Error;
-use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
+use peri::bonds::{BodyGeometry, BondDamage, LatticeBonds, VolumeCorrection};
 use peri::calibrate::{Space, modulus};
 use peri::geometry::{Cut, Operation, Shape, lattice};
 use peri::material::BondMaterial;
@@ -58,7 +58,7 @@ fn a_model_is_its_parts() {
     };
     simulation.solve_with(DynamicRelaxation::default(), count).unwrap();
     let (bonds, state) = by_hand();
-    assert!(state.broken > 0, "the sheet tears");
+    assert!(state.fracture.broken > 0, "the sheet tears");
     assert_eq!(simulation.state, state);
     assert_eq!(simulation.bonds.intact(), bonds.intact());
     assert!(seen >= 3 && simulation.history().len() == 3);
@@ -124,7 +124,7 @@ fn a_law_of_the_caller() {
         simulation
     };
     let (ours, theirs) = (torn(Rubber::of_law(Springs(0.7), 1e6)), torn(Rubber::new(Law::Linear, 1e6)));
-    assert!(theirs.state.broken > 0);
+    assert!(theirs.state.fracture.broken > 0);
     assert_eq!(ours.bonds.intact(), theirs.bonds.intact());
     let peak = theirs.history().iter().map(|record| record.load.abs()).fold(0.0, f64::max);
     for (a, b) in ours.history().iter().zip(theirs.history()) {

@@ -3,7 +3,7 @@
 
 use crate::bodies::{Random, hold};
 use evidence::{at_most, within};
-use peri::bonds::{Bonds, LatticeBonds, Overstretched, VolumeCorrection};
+use peri::bonds::{BodyGeometry, BondDamage, Bonds, LatticeBonds, Overstretched, VolumeCorrection};
 use peri::calibrate::Space;
 use peri::geometry::{Cut, Operation, Shape, lattice};
 use peri::material::{Affine, Correspondence, EightChain, Material, NonlocalSolid};
@@ -83,7 +83,7 @@ fn tightness<const D: usize, M: Material<D> + 'static>(
                 let mut system = System::of_response(&mut bonds, response, &loads, &[]);
                 let solver = VelocityVerlet { records: 1, ..VelocityVerlet::new(1.0, 1e-9) };
                 solver.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(())).unwrap();
-                let ratio = (state.motion.critical_step / state.motion.gershgorin_step).powi(2);
+                let ratio = (state.motion.limits.critical_step / state.motion.limits.gershgorin_step).powi(2);
                 // steps of 1.3 ω² are covered at least
                 found = [found[0].min(ratio), found[1].max(ratio)];
             }
@@ -147,16 +147,21 @@ fn pulled<const D: usize, M: Material<D> + 'static>(name: &str, cells: [usize; D
     let most = state.history.iter().map(|row| row.largest_stretch).fold(0.0, f64::max);
     println!(
         "{name}: {} steps, {} forces, {} bounds, {} searches, stretch {most:.2}, energies off by {worst:.1e}, step {:.4} of {:.4} at rest",
-        state.total_iterations,
-        state.evaluations,
-        state.motion.bounds,
-        state.motion.searches,
-        state.motion.time_step,
-        state.motion.critical_step,
+        state.counts.total_iterations,
+        state.counts.evaluations,
+        state.motion.limits.bounds,
+        state.motion.limits.searches,
+        state.motion.steps.time_step,
+        state.motion.limits.critical_step,
     );
     assert!(most > 2.9, "{most}");
     at_most(&format!("pulled_{name}_energy"), worst, 0.02);
-    within(&format!("pulled_{name}_step"), state.motion.time_step / state.motion.critical_step, 0.5, 0.9);
+    within(
+        &format!("pulled_{name}_step"),
+        state.motion.steps.time_step / state.motion.limits.critical_step,
+        0.5,
+        0.9,
+    );
 }
 
 #[test]
@@ -185,11 +190,12 @@ fn torn(pause: Option<u64>) -> State<2> {
         let response = rubber::<2>(Space::PlaneStress, f64::INFINITY).respond(&bonds);
         let mut system = System::of_response(&mut bonds, response, &loads, &[]);
         system.breaking = Some(Breaking { criterion: Criterion::Energy(1.0), policy: Policy::default() });
-        let mut watch =
-            |_: &Status, state: &State<2>| match pause.is_some_and(|steps| state.total_iterations == steps) {
-                true => Err(polycore::Error::Interrupted { program: "peri", output: "here".into() }.into()),
-                false => Ok(()),
-            };
+        let mut watch = |_: &Status, state: &State<2>| match pause
+            .is_some_and(|steps| state.counts.total_iterations == steps)
+        {
+            true => Err(polycore::Error::Interrupted { program: "peri", output: "here".into() }.into()),
+            false => Ok(()),
+        };
         let result = solver.solve(&mut system, state, &mut watch, &mut |_, _| Ok(()));
         match (&result, pause) {
             (Err(_), Some(_)) => {
@@ -213,22 +219,22 @@ fn torn_solids_keep_a_stable_step() {
     let off = (last.work - last.stored - last.kinetic - last.damped - last.released).abs() / last.work;
     println!(
         "torn: {} steps, {} forces, {} bounds, {} searches, {} broken, energies off by {off:.1e} of {:.3}, step {:.2e} of {:.2e} at rest",
-        one.total_iterations,
-        one.evaluations,
-        one.motion.bounds,
-        one.motion.searches,
-        one.broken,
+        one.counts.total_iterations,
+        one.counts.evaluations,
+        one.motion.limits.bounds,
+        one.motion.limits.searches,
+        one.fracture.broken,
         last.work,
-        one.motion.time_step,
-        one.motion.critical_step,
+        one.motion.steps.time_step,
+        one.motion.limits.critical_step,
     );
     // the ligament of 14 columns has 18 bonds a column across it
-    assert!(one.broken > 14 * 18, "{}", one.broken);
+    assert!(one.fracture.broken > 14 * 18, "{}", one.fracture.broken);
     at_most("torn_solid_energy", off, 0.03);
     for threads in [2, 3] {
         assert!(run(threads, None) == one, "{threads} threads differ from one");
     }
-    for pause in [1, 17, one.total_iterations / 2, one.total_iterations - 3] {
+    for pause in [1, 17, one.counts.total_iterations / 2, one.counts.total_iterations - 3] {
         let again = run(1, Some(pause));
         assert!(
             again.displacement == one.displacement

@@ -3,7 +3,9 @@
 use harness::case::{Case, Options, Run};
 use harness::output::vtkhdf;
 use harness::scene::Source;
-use peri::bonds::{Bonds, CloudBonds, LatticeBonds, VolumeCorrection, components, fragments};
+use peri::bonds::{
+    BodyGeometry, BondDamage, CloudBonds, LatticeBonds, VolumeCorrection, components, fragments,
+};
 use peri::geometry::{Cut, Gaps, Operation, Shape, lattice};
 use peri::model::Body;
 use peri::program::run::{Finished, Peri, run};

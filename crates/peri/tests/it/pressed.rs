@@ -1,8 +1,8 @@
 //! Bodies pressed onto each other, in equilibrium: springs in series, flanks of a crack, no list in any bit.
 
 use crate::bodies::{Body, Built, MODULUS, Slit, distance, hold, rms};
-use peri::bonds::Bonds;
-use peri::contact::{Contact, SHORT_RANGE, Touching};
+use peri::bonds::{BodyGeometry, Bonds};
+use peri::contact::{Contact, ContactSummary, SHORT_RANGE};
 use peri::material::BondMaterial;
 use peri::potential::Law;
 use peri::solver::{
@@ -52,7 +52,7 @@ fn methods<const D: usize>(tolerance: f64) -> [Box<dyn Equilibrium<D>>; 2] {
 }
 
 /// What touches in the last step.
-fn touching<const D: usize>(state: &State<D>) -> Touching {
+fn touching<const D: usize>(state: &State<D>) -> ContactSummary {
     state.history.last().unwrap().contact.unwrap()
 }
 
@@ -98,9 +98,9 @@ fn springs_in_series() {
                 );
                 assert!((inside.overlap * 0.9 - force / spring).abs() < 1e-6, "{inside:?}");
             }
-            eprintln!("series, κ = {stiffness}, {name}: {} force evaluations", state.evaluations);
+            eprintln!("series, κ = {stiffness}, {name}: {} force evaluations", state.counts.evaluations);
             // some hundred a step, however stiff the contact
-            assert!(state.evaluations < 4000, "{name}, κ = {stiffness}: {}", state.evaluations);
+            assert!(state.counts.evaluations < 4000, "{name}, κ = {stiffness}: {}", state.counts.evaluations);
         }
     }
 }
@@ -150,7 +150,7 @@ fn elastic_blocks_press_each_other() {
         eprintln!(
             "blocks, cloud {cloud}, method {which}: {:?}, {} evaluations, {lists} lists",
             touching(&state),
-            state.evaluations
+            state.counts.evaluations
         );
         // a strain of 0.9/14 over 15 and over a part of the spacing
         assert!(touching(&state).pairs > 20 && touching(&state).overlap < 0.2);
@@ -163,7 +163,7 @@ fn elastic_blocks_press_each_other() {
         // residuals of 1e-6 over the softest mode
         assert!(apart < 1e-4 && (loads[0] / loads[1] - 1.0).abs() < 1e-5, "{apart:.1e} {loads:?}");
     }
-    let [slow, fast] = [&seen[0].0, &seen[2].0].map(|state| state.evaluations);
+    let [slow, fast] = [&seen[0].0, &seen[2].0].map(|state| state.counts.evaluations);
     assert!(3 * fast < 2 * slow, "{fast} {slow}");
 }
 
@@ -172,7 +172,7 @@ fn bits<const D: usize>(state: &State<D>) -> Vec<u64> {
     let all = fields.into_iter().flat_map(|field| field.components().into_iter().flatten());
     let history = state.history.iter().flat_map(|row| [row.load, row.stored]);
     let numbers = all.copied().chain(history).chain([state.work]);
-    numbers.map(f64::to_bits).chain([state.total_iterations, state.broken]).collect()
+    numbers.map(f64::to_bits).chain([state.counts.total_iterations, state.fracture.broken]).collect()
 }
 
 /// A sheet with a crack of zero width across most of it, pressed upon and sheared by twice as much, so that the flanks
@@ -212,7 +212,7 @@ fn flanks_do_not_interpenetrate() {
                 let touching = touching(&state);
                 eprintln!(
                     "down {down}, κ = {stiffness}, method {which}: {touching:?}, {} evaluations",
-                    state.evaluations
+                    state.counts.evaluations
                 );
                 touching.overlap
             });
@@ -238,7 +238,7 @@ fn neither_threads_nor_lists_nor_restarts_change_a_bit() {
             let (law, contact) = (Law::ChainOffset, Some([SHORT_RANGE, skin]));
             let run = Run { bonds, loads: &loads, factors: &[0.4, 0.7, 1.0], law, contact, breaking };
             let lists = run.solve(&mut *methods(1e-2)[which], &mut state, &mut |state, restartable| {
-                if restartable && state.total_iterations >= save && saved.is_none() {
+                if restartable && state.counts.total_iterations >= save && saved.is_none() {
                     saved = Some(state.clone());
                 }
             });
@@ -248,7 +248,7 @@ fn neither_threads_nor_lists_nor_restarts_change_a_bit() {
     };
     for (which, cloud) in [(0, false), (0, true), (1, false), (1, true)] {
         let (one, _, lists, state) = run(which, 1, 0.5, cloud, None, u64::MAX);
-        let (broken, iterations) = (state.broken, state.total_iterations);
+        let (broken, iterations) = (state.fracture.broken, state.counts.total_iterations);
         eprintln!("{:?}, {broken} broken, {iterations} iterations, {lists} lists", touching(&state));
         assert!(touching(&state).pairs > 20 && broken > 0);
         assert!(run(which, 3, 0.5, cloud, None, u64::MAX).0 == one, "threads, cloud: {cloud}");
@@ -258,7 +258,7 @@ fn neither_threads_nor_lists_nor_restarts_change_a_bit() {
         }
         // L-BFGS may be restarted where it restarts, which is at the start of a step
         let saved = run(which, 2, 0.5, cloud, None, iterations * [3, 1][which] / 4).1.unwrap();
-        assert!(saved.total_iterations < iterations);
+        assert!(saved.counts.total_iterations < iterations);
         assert!(run(which, 2, 0.2, cloud, Some(saved), u64::MAX).0 == one, "restart, cloud: {cloud}");
     }
 }

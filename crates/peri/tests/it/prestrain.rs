@@ -3,7 +3,7 @@
 use crate::bodies::{Body, MODULUS, hold, laws, scatter};
 use crate::materials::battery;
 use evidence::near;
-use peri::bonds::{Bonds, Seen};
+use peri::bonds::{BodyGeometry, Bonds, StretchScan};
 use peri::calibrate::modulus_in;
 use peri::field::Field;
 use peri::material::{BondMaterial, Material, Pointwise, Prestrained, Response};
@@ -225,7 +225,7 @@ fn prestrained_bonds_break() {
             .map(|x| [(stretch * (1.0 + prestrain) - 1.0) * x[0], prestrain * x[1]])
             .collect();
         let displacement = scatter(bonds.sites(), &built.on_lattice, &moved);
-        let found = body.overstretched(bonds, &displacement, &critical, &Seen::default());
+        let found = body.overstretched(bonds, &displacement, &critical, &StretchScan::default());
         assert!(body.least_rest() <= 1.0 - prestrain.abs());
         found.iter().map(|bond| (bond.site, bond.index)).collect::<Vec<_>>()
     };

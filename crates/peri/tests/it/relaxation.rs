@@ -1,7 +1,7 @@
 //! Dynamic relaxation: the DENT specimen of `dent.py`, work counts, the same bits for any number of threads.
 
 use crate::bodies::{Body, hold, relax};
-use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
+use peri::bonds::{BodyGeometry, Bonds, LatticeBonds, VolumeCorrection};
 use peri::calibrate::{Space, modulus};
 use peri::geometry::{Cut, Operation, Shape, lattice};
 use peri::potential::{BondPotential, Law};
@@ -70,12 +70,12 @@ fn dent_at_four_millimetres() {
     // formulation.md: 14.069 N ± 0.1 % at tol 1e-6
     let pull = dent.pull(&state);
     assert!((pull / 14.069 - 1.0).abs() < 1e-3, "{pull} N");
-    eprintln!("dent, dx = 4: {pull:.4} N, {} iterations in 10 steps", state.total_iterations);
+    eprintln!("dent, dx = 4: {pull:.4} N, {} iterations in 10 steps", state.counts.total_iterations);
     // formulation.md: 150–195 iterations to 1e-3 and 310–330 to 1e-6 for one elastic step, from half the affine strain
     // (`s7_adr.py`); from the whole of it, as here, 76 and 139 were measured
     for (tolerance, most) in [(1e-3, 100), (1e-6, 180)] {
         let state = dent.relax(tolerance, &[1.0]);
-        let (pull, iterations) = (dent.pull(&state), state.total_iterations);
+        let (pull, iterations) = (dent.pull(&state), state.counts.total_iterations);
         eprintln!("dent, dx = 4, one step to {tolerance:.0e}: {pull:.4} N, {iterations} iterations");
         assert!(iterations <= most, "{iterations} iterations to {tolerance:.0e}");
         // the same equilibrium in one step as in ten
@@ -90,7 +90,10 @@ fn dent_at_two_millimetres() {
         let mut dent = Dent::new(2e-3, notch);
         let state = dent.relax(1e-3, &[0.5, 1.0]);
         let pull = dent.pull(&state);
-        eprintln!("dent, dx = 2, a = {notch}: {pull:.3} N, {} iterations in 2 steps", state.total_iterations);
+        eprintln!(
+            "dent, dx = 2, a = {notch}: {pull:.3} N, {} iterations in 2 steps",
+            state.counts.total_iterations
+        );
         assert!((pull / expected - 1.0).abs() < 0.01, "a = {notch}: {pull} N");
     }
 }
@@ -111,7 +114,7 @@ fn bits_do_not_depend_on_threads() {
             assert!(bonds.sites() > 3 * peri::field::CHUNK);
             let bits: Vec<u64> =
                 state.displacement.components().into_iter().flatten().map(|x| x.to_bits()).collect();
-            (state.total_iterations, bits)
+            (state.counts.total_iterations, bits)
         })
     };
     for cloud in [false, true] {
@@ -145,7 +148,7 @@ fn every_stress_free_law_converges() {
             let mut state = State::new(bonds.sites());
             relax(&solver, bonds, (&*potential, 1.0), &loads, &[0.5, 1.0], &mut state)
                 .unwrap_or_else(|error| panic!("{}: {error}", law.name()));
-            iterations.push(state.total_iterations);
+            iterations.push(state.counts.total_iterations);
         }
         eprintln!("{}: {iterations:?} iterations in two steps to 1e-6", law.name());
         // both paths see the same forces to rounding and so take the same way, but for the last iteration or two

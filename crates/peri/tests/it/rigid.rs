@@ -1,7 +1,7 @@
 //! Bodies whose reactions vanish: moved by one grip, cut in two, without loads. A residual over reactions alone never converges.
 
 use crate::bodies::{Body, MODULUS, hold};
-use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
+use peri::bonds::{BodyGeometry, Bonds, LatticeBonds, VolumeCorrection};
 use peri::geometry::{Cut, Operation, Shape, lattice};
 use peri::material::BondMaterial;
 use peri::potential::Law;
@@ -51,7 +51,11 @@ fn a_body_moved_by_one_grip() {
             let loads = grip(&bonds, far);
             let mut state = State::new(bonds.sites());
             solve(&mut *method, &mut bonds, &loads, &factors, &mut state).unwrap();
-            assert!(state.total_iterations <= 10, "{name}, U = {far}: {} iterations", state.total_iterations);
+            assert!(
+                state.counts.total_iterations <= 10,
+                "{name}, U = {far}: {} iterations",
+                state.counts.total_iterations
+            );
             let size = far * WAY[0].hypot(WAY[1]);
             for &site in bonds.particles() {
                 let u = state.displacement.get(site as usize);
@@ -116,6 +120,6 @@ fn a_body_at_rest_stays() {
         let loads = hold(&bonds, |x| (x[1] < 1e-3).then_some((0b11, [0.0; 2])));
         let mut state = State::new(bonds.sites());
         solve(&mut *method, &mut bonds, &loads, &[0.5, 1.0], &mut state).unwrap();
-        assert_eq!(state.total_iterations, 0, "{name}");
+        assert_eq!(state.counts.total_iterations, 0, "{name}");
     }
 }

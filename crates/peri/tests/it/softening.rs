@@ -3,7 +3,7 @@
 use crate::bodies::{Body, Random, Slit, hold, scatter};
 use crate::solids::{Plain, displaced, neo_hooke, rubber};
 use evidence::{at_most, near};
-use peri::bonds::{Bonds, CloudBonds, Softened, StretchRange};
+use peri::bonds::{BodyGeometry, Bonds, CloudBonds, Softened, StretchRange};
 use peri::calibrate::Space;
 use peri::critical::bilinear;
 use peri::field::Field;
@@ -166,7 +166,7 @@ fn strip(rows: usize, ductility: f64, weak: f64) -> f64 {
             bonds.neighbours(site as usize, &mut |bond| {
                 if row(site as usize) || row(bond.site) {
                     let (greatest, integrity) = (e * e * onset, weak);
-                    state.softened.push(Softened { site, index: bond.index, greatest, integrity });
+                    state.fracture.softened.push(Softened { site, index: bond.index, greatest, integrity });
                 }
             });
         }
@@ -186,9 +186,9 @@ fn strip(rows: usize, ductility: f64, weak: f64) -> f64 {
         peak / strength,
         state.history.len(),
         state.history.iter().map(|record| record.rounds).sum::<u64>(),
-        state.broken
+        state.fracture.broken
     );
-    assert!(state.broken > 0);
+    assert!(state.fracture.broken > 0);
     peak / strength
 }
 
@@ -225,7 +225,7 @@ fn tear(moving: bool, start: Option<&State<2>>, saved: &mut Vec<State<2>>) -> St
     let mut seen = 0;
     let mut watch = |status: &Status, state: &State<2>| {
         seen += 1;
-        if status.restartable && !state.softened.is_empty() && (!moving || seen % 50 == 0) {
+        if status.restartable && !state.fracture.softened.is_empty() && (!moving || seen % 50 == 0) {
             saved.push(state.clone());
         }
         Ok(())
@@ -250,11 +250,11 @@ fn a_softening_strip_tears() {
         let mut saved = Vec::new();
         let whole = tear(moving, None, &mut saved);
         let last = whole.history.last().unwrap();
-        let soft: u64 = saved.iter().map(|state| state.softened.len() as u64).max().unwrap();
+        let soft: u64 = saved.iter().map(|state| state.fracture.softened.len() as u64).max().unwrap();
         eprintln!(
             "moving {moving}: {} broken, up to {soft} softened, {} evaluations, {} states; work {:.4}, stored {:.4}, released {:.4}, kinetic {:.4}",
             last.broken,
-            whole.evaluations,
+            whole.counts.evaluations,
             saved.len(),
             last.work,
             last.stored,
@@ -272,7 +272,7 @@ fn a_softening_strip_tears() {
         }
         for state in saved.iter().step_by(saved.len().div_ceil(3)) {
             let again = tear(moving, Some(state), &mut Vec::new());
-            assert!(again == whole, "{moving}: from step {}, round {}", state.step, state.round);
+            assert!(again == whole, "{moving}: from step {}, round {}", state.step, state.control.round);
         }
     }
 }

@@ -4,7 +4,9 @@
 use crate::bodies::{Body, Random, scatter};
 use crate::materials::battery;
 use evidence::{at_most, near};
-use peri::bonds::{Bonds, LatticeBonds, Overstretched, StretchRange, VolumeCorrection};
+use peri::bonds::{
+    BodyGeometry, BondDamage, Bonds, LatticeBonds, Overstretched, StretchRange, VolumeCorrection,
+};
 use peri::calibrate::Space;
 use peri::field::Field;
 use peri::geometry::{Operation, Shape, lattice};
@@ -394,7 +396,7 @@ impl<const D: usize, M: Material<D>> Material<D> for Plain<M> {
     fn stiffness(&self, family: &Family<D>, points: &[M::Point]) -> f64 {
         self.0.stiffness(family, points)
     }
-    fn micromodulus(&self, bonds: &dyn Bonds<D>) -> f64 {
+    fn micromodulus(&self, bonds: &dyn BodyGeometry<D>) -> f64 {
         self.0.micromodulus(bonds)
     }
 }
@@ -517,7 +519,7 @@ fn iterations_at_large_bulk_moduli() {
         let mut simulation = model.build().unwrap();
         let method = peri::solver::Lbfgs { tolerance: 1e-4, ..Default::default() };
         simulation.solve(method).unwrap();
-        simulation.state.total_iterations as f64
+        simulation.state.counts.total_iterations as f64
     };
     let found = [10.0, 100.0, 1000.0].map(iterations);
     // without the volume in the coarse level: 23, 205, 2470

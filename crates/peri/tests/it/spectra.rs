@@ -2,7 +2,7 @@
 //! convergence at finite strains, against an independent program (`docs/reference/correspondence`) and closed forms.
 
 use evidence::{at_most, near};
-use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
+use peri::bonds::{BodyGeometry, Bonds, LatticeBonds, VolumeCorrection};
 use peri::calibrate::Space;
 use peri::field::Field;
 use peri::geometry::{Operation, Shape, lattice};
@@ -233,7 +233,7 @@ pub fn errors(bonds: &mut dyn Bonds<2>, n: usize, bulk: f64, volume: f64) -> [f6
     state.displacement.clone_from(&exact);
     let method = Lbfgs { tolerance: 1e-8, max_iterations: 5000, ..Default::default() };
     method.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(())).unwrap();
-    assert_eq!(state.unconverged, 0, "n = {n}, K/μ = {bulk}");
+    assert_eq!(state.counts.unconverged, 0, "n = {n}, K/μ = {bulk}");
     points.prepare(&*system.bonds, &state.displacement);
     let squares = inside.iter().map(|&(site, truth)| {
         let (found, wanted) = (state.displacement.get(site), exact.get(site));

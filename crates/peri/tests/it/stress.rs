@@ -2,7 +2,7 @@
 //! the sum over all bonds written out here, and against the balance of momentum.
 
 use crate::bodies::{Body, Built, MODULUS, Pair, Random, fit, norm, scatter, stretch_range};
-use peri::bonds::{Bonds, LatticeBonds};
+use peri::bonds::{BodyGeometry, BondForces, LatticeBonds};
 use peri::calibrate::{Space, modulus, poisson_ratio};
 use peri::field::Field;
 use peri::geometry::lattice;

@@ -2,7 +2,7 @@
 //! (`s12_mosurf.py`).
 
 use crate::bodies::{fit, relax};
-use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
+use peri::bonds::{BodyGeometry, BondForces, LatticeBonds, VolumeCorrection};
 use peri::calibrate::{Space, modulus, stiffness_1111};
 use peri::correction::surface_factors;
 use peri::geometry::{Operation, Shape, lattice};
@@ -46,7 +46,7 @@ fn plate(spacing: f64, volume: VolumeCorrection, surface: bool) -> [f64; 3] {
     let (right, left) = (nearest(0.4, 0.3), nearest(-0.4, 0.3));
     let length = bonds.position(right)[0] - bonds.position(left)[0];
     let strain = (state.displacement.get(right)[0] - state.displacement.get(left)[0]) / length;
-    let fit = fit(&*law, state.fitted);
+    let fit = fit(&*law, state.stretches.fitted);
     let loaded = Loaded { displacement: &state.displacement, fit: &fit, modulus, missing: Missing::Bonds };
     let largest = |tensors: Vec<Tensor<2>>| {
         // the two columns beside the axis, averaged row by row
@@ -64,7 +64,7 @@ fn plate(spacing: f64, volume: VolumeCorrection, surface: bool) -> [f64; 3] {
     eprintln!(
         "dx = {spacing}, {volume:?}, surface {surface}: strain {:.4}, hardy {hardy:.3}, one-point {one_point:.3}, {} its",
         strain / stress,
-        state.total_iterations
+        state.counts.total_iterations
     );
     [strain / stress, hardy, one_point]
 }

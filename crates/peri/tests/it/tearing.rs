@@ -3,7 +3,9 @@
 
 use evidence::near;
 use harness::scene::Source;
-use peri::bonds::{Bonds, CloudBonds, LatticeBonds, Overstretched, VolumeCorrection};
+use peri::bonds::{
+    BodyGeometry, BondDamage, Bonds, CloudBonds, LatticeBonds, Overstretched, VolumeCorrection,
+};
 use peri::calibrate::{Space, modulus, stiffness_1111};
 use peri::correction::surface_factors;
 use peri::critical::{Context, Convention, CrackArea, Critical, Crossing, fracture_energy};
@@ -167,9 +169,10 @@ fn forces_of_soft_bonds_are_slopes() {
             let [x, y] = bonds.position(site);
             displacement.set(site, [0.01 * (0.7 * x).sin(), 0.03 * y + 0.02 * (0.5 * x + y).cos()]);
         }
-        let cover = peri::material::Cover { stretches: [0.9, 1.2], bound: 1e-9, clamped: true, known: None };
+        let cover =
+            peri::material::LawCover { stretches: [0.9, 1.2], bound: 1e-9, clamped: true, known: None };
         response.cover(&mut *bonds, &displacement, &cover).unwrap();
-        bonds.round(&displacement);
+        bonds.prepare(&displacement);
         response.prepare(&*bonds, &displacement);
         let mut force = Field::<2>::zeros(bonds.sites());
         for (chunk, mut part) in force.chunks_mut().into_iter().enumerate() {

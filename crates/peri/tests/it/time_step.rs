@@ -4,10 +4,10 @@ use crate::bodies::{Body, hold};
 use crate::dynamics::{DENSITY, once, run};
 use harness::case::Fault;
 use peri::Error;
-use peri::bonds::Bonds;
+use peri::bonds::{BodyGeometry, Bonds};
 use peri::material::BondMaterial;
 use peri::potential::Law;
-use peri::solver::{Breaking, Loads, Method, Motion, Policy, State, System, VelocityVerlet};
+use peri::solver::{Breaking, Loads, Method, Policy, State, StepLimits, System, VelocityVerlet};
 
 /// Steps beyond the critical one are refused by name, with the exit code of bad input.
 #[test]
@@ -18,10 +18,10 @@ fn steps_beyond_the_critical_are_refused() {
     let mut state = State::new(bonds.sites());
     let solver = VelocityVerlet { records: 1, ..VelocityVerlet::new(DENSITY, 1e-3) };
     run(&solver, bonds, &*law, &Loads::default(), &mut state).unwrap();
-    let Motion { critical_step, gershgorin_step, covered_step, .. } = state.motion;
+    let StepLimits { critical_step, gershgorin_step, covered_step, .. } = state.motion.limits;
     eprintln!(
         "critical step {critical_step:.4e}, all stretches {covered_step:.4e}, Gershgorin {gershgorin_step:.4e} s, {} forces",
-        state.evaluations
+        state.counts.evaluations
     );
     assert!(gershgorin_step <= covered_step && covered_step <= critical_step);
     for factor in [1.05, 3.0] {
@@ -67,7 +67,7 @@ fn stiffening_beyond_the_step_is_named() {
     };
     let (result, state) = crush(None, 0.5);
     result.unwrap();
-    let (first, last) = (state.motion.critical_step, state.motion.time_step);
+    let (first, last) = (state.motion.limits.critical_step, state.motion.steps.time_step);
     let row = state.history.last().unwrap();
     let off = (row.kinetic + row.stored - row.work) / row.work;
     eprintln!(
@@ -82,7 +82,7 @@ fn stiffening_beyond_the_step_is_named() {
         let Error::Unstable { time, step, kinetic, available, time_step, critical } = error else {
             panic!("{error}")
         };
-        assert!(time > 0.0 && time < 60.0 && step == state.total_iterations);
+        assert!(time > 0.0 && time < 60.0 && step == state.counts.total_iterations);
         assert!(kinetic > available && kinetic.is_finite());
         assert!(time_step > critical, "{time_step} {critical}");
         assert!(state.displacement.non_finite().is_none() && state.velocity.non_finite().is_none());
@@ -106,7 +106,7 @@ fn tear(cloud: bool, pause: Option<u64>) -> State<2> {
         system.breaking = Some(Breaking { criterion: 1.1.into(), policy: Policy::EachIteration });
         let mut watch = |status: &peri::solver::Status, state: &State<2>| {
             assert!(status.restartable);
-            let stop = pause.is_some_and(|steps| state.total_iterations == steps);
+            let stop = pause.is_some_and(|steps| state.counts.total_iterations == steps);
             if stop {
                 Err(polycore::Error::Interrupted { program: "peri", output: "here".into() }.into())
             } else {
@@ -132,12 +132,19 @@ fn bits_do_not_depend_on_threads_or_restarts() {
             pool.install(|| tear(cloud, pause))
         };
         let one = run(1, None);
-        eprintln!("{} steps, {} broken, {} forces", one.total_iterations, one.broken, one.evaluations);
-        assert!(one.broken > 100 && one.total_iterations > 50, "{} broken", one.broken);
+        eprintln!(
+            "{} steps, {} broken, {} forces",
+            one.counts.total_iterations, one.fracture.broken, one.counts.evaluations
+        );
+        assert!(
+            one.fracture.broken > 100 && one.counts.total_iterations > 50,
+            "{} broken",
+            one.fracture.broken
+        );
         for threads in [2, 3] {
             assert!(run(threads, None) == one, "{threads} threads differ from one, cloud: {cloud}");
         }
-        for pause in [1, 17, one.total_iterations] {
+        for pause in [1, 17, one.counts.total_iterations] {
             let again = run(1, Some(pause));
             assert!(again.displacement == one.displacement && again.history == one.history, "{pause}");
             assert!(again.velocity == one.velocity && again.motion == one.motion, "{pause}");

@@ -2,7 +2,7 @@
 
 use crate::bodies::{Body, MODULUS, Slit, hold, relax};
 use crate::dynamics::{DENSITY, once, run};
-use peri::bonds::Bonds;
+use peri::bonds::{BodyGeometry, Bonds};
 use peri::material::BondMaterial;
 use peri::potential::Law;
 use peri::solver::{Breaking, DynamicRelaxation, Loads, Method, Policy, State, System, VelocityVerlet};
@@ -57,7 +57,7 @@ fn waves_in_a_chain() {
             errors.fold(0.0, f64::max) / 0.5e-3
         };
         let continuum = |x: f64| 0.5 * (pulse(x - speed * time) + pulse(x + speed * time));
-        (largest(&exact), largest(&continuum), state.motion.critical_step * fastest / 2.0)
+        (largest(&exact), largest(&continuum), state.motion.limits.critical_step * fastest / 2.0)
     };
     let errors = [1.0, 0.5, 0.25].map(|part| run(200, 0.0125, part).0);
     for pair in errors.windows(2) {
@@ -147,7 +147,7 @@ fn wave_in_a_thin_bar() {
             modulus / youngs,
             1.0 + own,
             1.0 + material,
-            state.total_iterations
+            state.counts.total_iterations
         );
         // bars are dispersive by (νqh)²/24: 1e-4 for this pulse; sampling and the particles' grips the rest
         assert!(own.abs() < 1.5e-3, "{own}");
@@ -226,9 +226,9 @@ fn crack_speed(rows: usize, drive: f64, law: Law) -> f64 {
     eprintln!(
         "{rows} rows: {speed:.3} c_R, in parts {parts:.3?}; {} broken, {} steps, {} forces, strain {:.3} of critical; \
          released {took:.2} G a length, energies off by {off:.1e}",
-        state.broken,
-        state.total_iterations,
-        state.evaluations,
+        state.fracture.broken,
+        state.counts.total_iterations,
+        state.counts.evaluations,
         strain / stretch,
     );
     // steady; the tip is known to half a spacing in 0.4 m

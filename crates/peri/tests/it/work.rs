@@ -1,7 +1,7 @@
 //! Work and memory: counts that closed forms give, and bytes.
 
 use crate::bodies::{Body, hold, relax};
-use peri::bonds::{Bonds, LatticeBonds, Stencil};
+use peri::bonds::{BodyGeometry, BondDamage, Bonds, LatticeBonds, Stencil};
 use peri::geometry::{Operation, Shape, lattice};
 use peri::potential::Law;
 use peri::solver::{DynamicRelaxation, State};
@@ -111,8 +111,8 @@ fn force_evaluations() {
         let solver = DynamicRelaxation::default();
         relax(&solver, &mut built.lattice, (&*law, 1.0), &loads, factors, &mut state).unwrap();
         assert_eq!(state.step, factors.len());
-        let extra = state.evaluations - state.total_iterations;
-        assert!(state.total_iterations > 10);
-        assert_eq!(extra, factors.len() as u64, "{name}: {} iterations", state.total_iterations);
+        let extra = state.counts.evaluations - state.counts.total_iterations;
+        assert!(state.counts.total_iterations > 10);
+        assert_eq!(extra, factors.len() as u64, "{name}: {} iterations", state.counts.total_iterations);
     }
 }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::error::Error;
-use crate::mesh::labelled::line_error;
+use crate::file::line_error;
 
 /// A keyword line with its parameters.
 #[derive(Debug)]

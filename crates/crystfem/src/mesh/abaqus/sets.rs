@@ -4,13 +4,14 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::error::Error;
-use crate::mesh::labelled::{Content, Labels, line_error};
+use crate::file::line_error;
+use crate::mesh::file_mesh::{Content, Labels};
 use crate::mesh::surface::Surface;
 use crate::mesh::{Cell, Face, Mesh, Shape};
 
 /// What a set is of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Of {
+pub(super) enum SetKind {
     Nodes,
     Elements,
     /// Node set of the nodes of elements.
@@ -33,12 +34,12 @@ pub(super) enum Entry {
 #[derive(Debug)]
 pub(super) struct Set {
     pub name: String,
-    pub of: Of,
+    pub of: SetKind,
     pub entries: Vec<(usize, Entry)>,
 }
 
 impl Entry {
-    pub fn of(word: &str) -> Self {
+    pub fn parse(word: &str) -> Self {
         // Abaqus writes INSTANCE.SET for sets of a part
         let name = || word.rsplit('.').next().unwrap_or(word).trim_matches('"').to_owned();
         word.parse().map_or_else(|_| Self::Set(name()), Self::Label)
@@ -68,26 +69,26 @@ impl Resolver<'_> {
         for set in sets {
             let key = set.name.to_uppercase();
             match set.of {
-                Of::Nodes => {
+                SetKind::Nodes => {
                     let mut members = Vec::new();
                     for (line, entry) in &set.entries {
                         self.members(*line, entry, self.nodes, &node_sets, "node", &mut members)?;
                     }
                     node_sets.entry(key).or_insert((set.name, Vec::new())).1.append(&mut members);
                 }
-                Of::Elements => {
+                SetKind::Elements => {
                     let mut members = Vec::new();
                     for (line, entry) in &set.entries {
                         self.members(*line, entry, self.elements, &element_sets, "element", &mut members)?;
                     }
                     element_sets.entry(key).or_insert((set.name, Vec::new())).1.append(&mut members);
                 }
-                Of::NodesOfElements => {
+                SetKind::NodesOfElements => {
                     let mut members = Vec::new();
                     for (line, entry) in &set.entries {
                         self.members(*line, entry, self.elements, &element_sets, "element", &mut members)?;
                     }
-                    self.spend(set.entries.first().map_or(0, |entry| entry.0), 8 * members.len())?;
+                    self.count_work(set.entries.first().map_or(0, |entry| entry.0), 8 * members.len())?;
                     let of = members.iter().map(|place| &content.elements[*place as usize]);
                     let nodes = of
                         .flat_map(|element| content.nodes_of(element))
@@ -95,7 +96,7 @@ impl Resolver<'_> {
                         .collect();
                     node_sets.entry(key).or_insert((set.name, Vec::new())).1.append(&mut { nodes });
                 }
-                Of::Faces => {
+                SetKind::Faces => {
                     let mut found = Vec::new();
                     for (line, entry) in &set.entries {
                         let Entry::Side(of, side) = entry else { continue };
@@ -113,7 +114,7 @@ impl Resolver<'_> {
         Ok(())
     }
 
-    fn spend(&mut self, line: usize, count: usize) -> Result<(), Error> {
+    fn count_work(&mut self, line: usize, count: usize) -> Result<(), Error> {
         match self.budget.checked_sub(count) {
             Some(left) => {
                 self.budget = left;
@@ -138,14 +139,14 @@ impl Resolver<'_> {
     ) -> Result<(), Error> {
         match entry {
             Entry::Label(label) => {
-                self.spend(line, 1)?;
+                self.count_work(line, 1)?;
                 members.push(labels.get(*label).ok_or_else(|| {
                     line_error(self.path, line, format!("member of a set of {kind}s"), label, "existing ones")
                 })?);
             }
             Entry::Range([first, last, step]) => {
                 let inside = labels.range(*first, *last);
-                self.spend(line, inside.len().saturating_add(1))?;
+                self.count_work(line, inside.len().saturating_add(1))?;
                 let on = inside.iter().filter(|entry| (entry.0 - first).is_multiple_of(*step));
                 members.extend(on.map(|entry| entry.1));
             }
@@ -158,7 +159,7 @@ impl Resolver<'_> {
                     let allowed = format!("numbers, and {kind} sets above: {}", names.join(", "));
                     return Err(line_error(self.path, line, format!("{kind} set"), name, allowed));
                 };
-                self.spend(line, set.len().saturating_add(1))?;
+                self.count_work(line, set.len().saturating_add(1))?;
                 members.extend_from_slice(set);
             }
             Entry::Side(of, _) => self.members(line, of, labels, sets, kind, members)?,
@@ -176,7 +177,7 @@ impl Resolver<'_> {
         outer: &mut Option<BTreeMap<u32, Vec<u8>>>,
         found: &mut Vec<Face>,
     ) -> Result<(), Error> {
-        self.spend(line, 6 * members.len())?;
+        self.count_work(line, 6 * members.len())?;
         for place in members {
             let element = &content.elements[*place as usize];
             // shells and lines have no sides of their own

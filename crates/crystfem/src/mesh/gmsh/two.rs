@@ -5,7 +5,7 @@ use std::collections::HashMap;
 
 use super::{Kind, Numbers, Reader, kind_of, place, whole};
 use crate::error::Error;
-use crate::mesh::labelled::Node;
+use crate::mesh::file_mesh::Node;
 
 /// Tags of an element at most: a group, an entity, partitions.
 const TAGS: i64 = 10_000;

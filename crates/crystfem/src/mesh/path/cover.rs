@@ -1,5 +1,6 @@
 //! When a bead covers the centres of elements.
 
+use polycore::numerics::bounds;
 use std::collections::BTreeMap;
 
 use nalgebra::Vector2;
@@ -69,13 +70,7 @@ struct Centres {
 impl Centres {
     fn new(mesh: &Mesh, elements: &[u32], width: f64) -> Self {
         let centres: Vec<[f64; 3]> = elements.iter().map(|element| mesh.centre(*element)).collect();
-        let (mut lower, mut upper) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        for centre in &centres {
-            for d in 0..2 {
-                lower[d] = lower[d].min(centre[d]);
-                upper[d] = upper[d].max(centre[d]);
-            }
-        }
+        let [lower, upper] = bounds(centres.iter().map(|centre| [centre[0], centre[1]]));
         let size = width.max((upper[0] - lower[0]).max(upper[1] - lower[1]) / CELLS);
         let rows = ((upper[1] - lower[1]) / size) as u64 + 1;
         let mut all = Self { lower, upper, size, rows, sorted: Vec::new(), places: Vec::new() };

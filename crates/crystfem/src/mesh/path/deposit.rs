@@ -3,6 +3,7 @@
 use super::{Move, ToolPath};
 use crate::error::Error;
 use crate::mesh::voxels::{Frame, Voxels};
+use polycore::numerics::bounds;
 
 /// Pieces of a cell along each axis in which the bead's volume is counted.
 const PIECES: f64 = 4.0;
@@ -21,6 +22,13 @@ pub struct Cells {
     pub height: Option<f64>,
     /// Cells with a smaller filled part are left out; the volume in them goes to the others in equal proportion.
     pub least: f64,
+}
+
+impl Cells {
+    /// Cells of these edges, m, for filament of 1.75 mm: beads as high as the file tells, cells that are a tenth full.
+    pub fn new(size: [f64; 3]) -> Self {
+        Self { size, filament: super::FILAMENT, height: None, least: 0.1 }
+    }
 }
 
 /// What a path lays down.
@@ -137,16 +145,11 @@ fn by_tool(beads: &[(&Move, f64)], frame: &Frame, cells: &Cells, count: usize) -
 
 /// The grid around all beads.
 fn frame(beads: &[(&Move, f64)], cells: &Cells) -> Result<Frame, Error> {
-    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for (one, height) in beads {
+    let [low, high] = bounds(beads.iter().flat_map(|(one, height)| {
         let half = 0.5 * one.area(cells.filament) / height;
-        for end in [one.from, one.to] {
-            for d in 0..3 {
-                let [below, above] = if d == 2 { [*height, 0.0] } else { [half, half] };
-                (low[d], high[d]) = (low[d].min(end[d] - below), high[d].max(end[d] + above));
-            }
-        }
-    }
+        let corners = move |[x, y, z]: [f64; 3]| [[x - half, y - half, z - height], [x + half, y + half, z]];
+        [one.from, one.to].into_iter().flat_map(corners)
+    }));
     Frame::around(low, high, cells.size)
 }
 

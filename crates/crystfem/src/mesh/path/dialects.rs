@@ -325,7 +325,7 @@ fn limits_of_the_file() {
         };
         assert!((found - end).abs() < 1e-9, "{dialect}: {found} {end}");
     }
-    assert_eq!(parsed(one).limits_told(), None);
+    assert_eq!(parsed(one).describe_limits(), None);
     // a corner of 90° at jerk speed: as two moves that each end at 10 mm/s, but for the last
     let corner = time("M204 S500\nM205 X10 Y10\nG1 X100 F3000\nG1 Y100\n");
     let halves = with_jerk(100.0, 50.0, 500.0, 10.0)
@@ -394,7 +394,7 @@ fn estimates_are_compared() {
     let lines = parsed(&format!(
         "M83\n{go};LAYER_CHANGE\n;TYPE:Perimeter\nG1 X0 E1\n;TYPE:Solid infill\nG1 X10 E3\n"
     ))
-    .told(1.75e-3);
+    .summary(1.75e-3);
     assert!(lines[0].starts_with("the file prints 1 marked layer, middle lines from (0, 0, 0) mm to (100, 0, 0) mm, 9.621 mm³ of 4.0 mm"), "{lines:?}");
     assert_eq!(lines[1], "by feature: `Solid infill` 75.0 %, `Perimeter` 25.0 %");
 }

@@ -32,7 +32,7 @@ const MOST_TOOLS: f64 = 63.0;
 /// a centre or radius that fits, other curves (G5), other planes (G18, G19), and temperatures below absolute
 /// zero.
 pub fn read_gcode(path: &Path) -> Result<ToolPath, Error> {
-    parse(path, &crate::mesh::read_bytes(path)?)
+    parse(path, &crate::file::read_bytes(path)?)
 }
 
 /// [`read_gcode`], of bytes; `path` is for messages only.
@@ -139,7 +139,7 @@ impl<'a> Reader<'a> {
                 Line::Again(words) => match self.motion {
                     Some(motion) => {
                         self.repeated += 1;
-                        self.go(line, &code, motion, &words)?;
+                        self.run_command(line, &code, motion, &words)?;
                     }
                     None if words.wrong.is_some() => return Err(self.wrong(line, &words)),
                     None => self.skip("words without a command"),
@@ -166,7 +166,7 @@ impl<'a> Reader<'a> {
         error(self.path, line, "word", words.wrong.as_deref().unwrap_or_default(), "a letter and a number")
     }
 
-    fn go(&mut self, line: usize, text: &str, code: f64, words: &Words) -> Result<(), Error> {
+    fn run_command(&mut self, line: usize, text: &str, code: f64, words: &Words) -> Result<(), Error> {
         if words.wrong.is_some() {
             return Err(self.wrong(line, words));
         }
@@ -181,7 +181,7 @@ impl<'a> Reader<'a> {
         };
         let ToolPath { moves, motions, .. } = &mut self.tool_path;
         let before = motions.len();
-        let gone = self.printer.go(|letter| words.value(letter), arc, with, moves, motions);
+        let gone = self.printer.apply(|letter| words.value(letter), arc, with, moves, motions);
         self.stopped &= motions.len() == before;
         gone.map_err(|wrong| error(self.path, line, wrong.what, wrong.found_in(text), wrong.allowed))
     }
@@ -197,7 +197,7 @@ impl<'a> Reader<'a> {
         let code = format!("{letter}{number}");
         let value = |letter: char| words.value(letter);
         match code.as_str() {
-            "G0" | "G1" | "G2" | "G3" => return self.go(line, text, number, words),
+            "G0" | "G1" | "G2" | "G3" => return self.run_command(line, text, number, words),
             "G92" if words.wrong.is_some() => return Err(self.wrong(line, words)),
             "G5" if value('X').is_some() || value('Y').is_some() => {
                 return Err(error(self.path, line, "command", code, "straight moves and arcs, G0 to G3"));

@@ -1,6 +1,7 @@
 //! Heights of beads: what a comment tells, or down to what lies below.
 
 use super::{Move, ToolPath};
+use polycore::numerics::bounds;
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
@@ -45,13 +46,7 @@ enum Below {
 impl Map {
     /// Around printing moves whose cross-sections have this mean root, m.
     fn new(path: &ToolPath, root: f64) -> Self {
-        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        for one in path.printing() {
-            for d in 0..2 {
-                low[d] = low[d].min(one.from[d].min(one.to[d]));
-                high[d] = high[d].max(one.from[d].max(one.to[d]));
-            }
-        }
+        let [low, high] = bounds(path.printing().flat_map(|one| [one.from, one.to]).map(|[x, y, _]| [x, y]));
         let extent = [0, 1].map(|d| (high[d] - low[d]).max(0.0));
         let size = (CELL * root).max(extent[0].max(extent[1]) / CELLS).max(f64::MIN_POSITIVE);
         let count = extent.map(|extent| ((extent / size) as usize).min(CELLS as usize) + 1);

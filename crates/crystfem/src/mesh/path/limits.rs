@@ -2,7 +2,6 @@
 //! what a move takes with them.
 
 use super::line::{Words, keys};
-use super::plan::Ramp;
 
 const AXES: [char; 4] = ['X', 'Y', 'Z', 'E'];
 /// Steps of velocity where a file states accelerations alone, m/s: defaults of Marlin.
@@ -11,6 +10,16 @@ const JERK: [f64; 4] = [10e-3, 10e-3, 0.4e-3, 5e-3];
 const SQUARE_CORNER: f64 = 5e-3;
 /// M203 above this is per minute, mm/s: no such printer moves so fast.
 const FAST: f64 = 2000.0;
+
+/// A straight motion: how long it is, m, how fast, m/s, how it gets there, m/s², and with which velocity it
+/// may begin.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ramp {
+    pub length: f64,
+    pub velocity: f64,
+    pub acceleration: f64,
+    pub enter: f64,
+}
 
 /// Limits in SI units, by axis X, Y, Z, E.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -81,7 +90,7 @@ impl Limits {
             // mm/min always
             _ => set(&mut self.jerk, of_axes.map(|v| v / 60.0)),
         }
-        self.look();
+        self.update();
     }
 
     /// Takes in Klipper's SET_VELOCITY_LIMIT.
@@ -101,7 +110,7 @@ impl Limits {
             }
         }
         self.stated = true;
-        self.look();
+        self.update();
     }
 
     /// Takes in a setting that a slicer writes in a comment, `machine_max_jerk_x`.
@@ -123,15 +132,15 @@ impl Limits {
             _ => return,
         }
         self.stated = true;
-        self.look();
+        self.update();
     }
 
-    fn look(&mut self) {
+    fn update(&mut self) {
         self.accelerates = self.acceleration[..2].iter().chain(&self.by_kind).any(|a| a.is_finite());
     }
 
     /// One line of what they are.
-    pub fn told(&self) -> String {
+    pub fn describe(&self) -> String {
         let list = |all: &[f64]| {
             let values =
                 all.iter().map(|v| if v.is_finite() { format!("{:.6}", 1e3 * v) } else { "–".into() });

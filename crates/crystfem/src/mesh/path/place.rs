@@ -1,7 +1,7 @@
 //! Where a path lies: the box around it, where it is put, and how much of it misses the part.
 
 use super::{Bead, Move, ToolPath};
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, box_around};
 
 /// Places along a path at which it is looked up at most.
 const SAMPLES: f64 = 1e5;
@@ -17,14 +17,7 @@ impl ToolPath {
     /// The box around the middle lines of what is laid down, m: z from the bed side of the lowest bead to the highest
     /// nozzle. `None` of a path that prints nothing.
     pub fn bounds(&self, bead: Bead) -> Option<[[f64; 3]; 2]> {
-        let mut ends = self.printing().flat_map(|one| [one.from, one.to]);
-        let first = ends.next()?;
-        let [mut low, high] = ends.fold([first, first], |[mut low, mut high], end| {
-            for d in 0..3 {
-                (low[d], high[d]) = (low[d].min(end[d]), high[d].max(end[d]));
-            }
-            [low, high]
-        });
+        let [mut low, high] = box_around(self.printing().flat_map(|one| [one.from, one.to]))?;
         low[2] -= bead.height;
         Some([low, high])
     }

@@ -1,19 +1,9 @@
 //! Times of moves of a machine that cannot change its velocity at once.
 
-use super::limits::Limits;
+use super::limits::{Limits, Ramp};
 use super::{Motion, ToolPath};
 use crate::error::Error;
 use nalgebra::Vector3;
-
-/// A straight motion: how long it is, m, how fast, m/s, how it gets there, m/s², and with which velocity it
-/// may begin.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Ramp {
-    pub length: f64,
-    pub velocity: f64,
-    pub acceleration: f64,
-    pub enter: f64,
-}
 
 /// Durations of motions one after another, s, by trapezoids of velocity from rest to rest: passes back and
 /// forth give the velocity at each corner. `exit`: the velocity of the last at its end.
@@ -98,10 +88,10 @@ impl ToolPath {
     }
 
     /// The limits that the file states, in a line; `None` where it states none of motion.
-    pub fn limits_told(&self) -> Option<String> {
+    pub fn describe_limits(&self) -> Option<String> {
         let acts = |motion: &Motion| self.limits[motion.limits as usize].stated;
         let last = self.motions.iter().rfind(|motion| acts(motion))?;
-        Some(self.limits[last.limits as usize].told())
+        Some(self.limits[last.limits as usize].describe())
     }
 
     /// Gives motions, with start and end of each, s, new durations; all else keeps its own.

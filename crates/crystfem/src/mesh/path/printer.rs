@@ -12,14 +12,14 @@ const MOST_CHORDS: f64 = 1e6;
 const MISS: (f64, f64) = (1e-2, 2e-5);
 
 /// What of a move cannot be.
-pub(super) struct Wrong {
+pub(super) struct MoveError {
     pub what: &'static str,
     /// `None`: the whole line.
     found: Option<f64>,
     pub allowed: String,
 }
 
-impl Wrong {
+impl MoveError {
     pub fn found_in(&self, text: &str) -> String {
         self.found.map_or_else(|| text.trim().to_owned(), |found| found.to_string())
     }
@@ -80,15 +80,15 @@ impl Printer {
     }
 
     /// Adds a move, or the chords of an arc that turns by the sign of `arc`; none where the nozzle stays.
-    pub fn go(
+    pub fn apply(
         &mut self,
         value: impl Fn(char) -> Option<f64>,
         arc: Option<f64>,
         with: With,
         moves: &mut Vec<Move>,
         motions: &mut Vec<Motion>,
-    ) -> Result<(), Wrong> {
-        let velocity = |found| Wrong {
+    ) -> Result<(), MoveError> {
+        let velocity = |found| MoveError {
             what: "velocity F",
             found: Some(found),
             allowed: "positive and finite, before or in the first move".into(),
@@ -183,23 +183,27 @@ impl Printer {
         from: [f64; 3],
         turn: f64,
         value: impl Fn(char) -> Option<f64>,
-    ) -> Result<(f64, Vec<[f64; 3]>), Wrong> {
+    ) -> Result<(f64, Vec<[f64; 3]>), MoveError> {
         let to = self.place;
         let (across, up) = ([to[0] - from[0], to[1] - from[1]], to[2] - from[2]);
         let way = across[0].hypot(across[1]);
         let centre = match (value('I'), value('J'), value('R')) {
             (None, None, None) => {
-                return Err(Wrong { what: "arc", found: None, allowed: "I and J, or R".into() });
+                return Err(MoveError { what: "arc", found: None, allowed: "I and J, or R".into() });
             }
             (None, None, Some(_)) if way == 0.0 => {
-                return Err(Wrong { what: "arc", found: None, allowed: "I and J for a full circle".into() });
+                return Err(MoveError {
+                    what: "arc",
+                    found: None,
+                    allowed: "I and J for a full circle".into(),
+                });
             }
             (None, None, Some(radius)) => {
                 let own = radius.abs() * self.unit;
                 // half a digit of the file
                 if own < 0.5 * way - MISS.1 {
                     let allowed = format!("{} or more in size", 0.5 * way / self.unit);
-                    return Err(Wrong { what: "radius of an arc", found: Some(radius), allowed });
+                    return Err(MoveError { what: "radius of an arc", found: Some(radius), allowed });
                 }
                 let height = (own * own - 0.25 * way * way).max(0.0).sqrt() / way;
                 // a negative radius is the longer way round
@@ -217,14 +221,14 @@ impl Printer {
         if (first - last).abs() > MISS.0 * first + MISS.1 {
             let [first, last] = [first, last].map(|radius| (1e9 * radius).round() / 1e9 / self.unit);
             let allowed = format!("as far as its start, {first} from its centre");
-            return Err(Wrong {
+            return Err(MoveError {
                 what: "end of an arc, distance from its centre",
                 found: Some(last),
                 allowed,
             });
         }
         if first == 0.0 {
-            return Err(Wrong { what: "radius of an arc", found: Some(0.0), allowed: "above 0".into() });
+            return Err(MoveError { what: "radius of an arc", found: Some(0.0), allowed: "above 0".into() });
         }
         let mut sweep = (turn * (angle(to) - angle(from))).rem_euclid(TAU);
         if way <= 1e-9 * first {

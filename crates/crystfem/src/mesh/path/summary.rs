@@ -1,6 +1,7 @@
 //! What a file prints, in lines for who wrote it.
 
 use super::ToolPath;
+use polycore::numerics::bounds;
 
 /// A printing move that falls by more than this, and more steeply, lays nothing on anything, m.
 const FALL: f64 = 1e-3;
@@ -37,14 +38,9 @@ impl ToolPath {
 
     /// Layers, box, filament, volume and time of what is printed, and the share of each feature in its
     /// volume. `filament`: its diameter, m.
-    pub fn told(&self, filament: f64) -> Vec<String> {
+    pub fn summary(&self, filament: f64) -> Vec<String> {
         let ends = || self.printing().flat_map(|one| [one.from, one.to]);
-        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for end in ends() {
-            for d in 0..3 {
-                (low[d], high[d]) = (low[d].min(end[d]), high[d].max(end[d]));
-            }
-        }
+        let [low, high] = bounds(ends());
         let place = |at: [f64; 3]| {
             let [x, y, z] = at.map(|x| (1e6 * x).round() / 1e3);
             format!("({x}, {y}, {z}) mm")

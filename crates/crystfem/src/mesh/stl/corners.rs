@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::error::Error;
-use crate::mesh::labelled::line_error;
+use crate::file::line_error;
 
 /// Three of each triangle, and what was passed over.
 pub(super) type Corners = (Vec<[f32; 3]>, Option<String>);

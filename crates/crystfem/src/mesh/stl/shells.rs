@@ -1,5 +1,6 @@
 //! Shells of a surface: whether they are closed, and which side of each is outside.
 
+use polycore::numerics::{Sets, bounds};
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
@@ -27,7 +28,7 @@ pub(super) struct Shell {
 
 /// The number of each point after points closer than [`WELD`] became one, the first of them.
 pub(super) fn weld(points: &[[f64; 3]]) -> Vec<u32> {
-    let [low, high] = bounds(points.iter());
+    let [low, high] = bounds(points.iter().copied());
     let size = (0..3).map(|d| high[d] - low[d]).fold(0.0, f64::max);
     let near = WELD * size;
     if !(near > 0.0 && near.is_finite()) {
@@ -94,27 +95,17 @@ pub(super) fn shells(
         }
     }
     closed(path, points, &edges)?;
-    // the first of the triangles that each is joined to
-    let mut of: Vec<u32> = (0..triangles.len() as u32).collect();
-    let root = |of: &mut Vec<u32>, mut k: u32| {
-        while of[k as usize] != k {
-            of[k as usize] = of[of[k as usize] as usize];
-            k = of[k as usize];
-        }
-        k
-    };
+    let mut joined = Sets::new(triangles.len());
     for (k, &[a, b, c]) in (0_u32..).zip(&*triangles) {
         for [p, q] in [[a, b], [b, c], [c, a]] {
-            let other = edges.get(&[p.min(q), p.max(q)]).map_or(k, |edge| edge.1);
-            let [one, two] = [root(&mut of, k), root(&mut of, other)];
-            of[one.max(two) as usize] = one.min(two);
+            joined.join(k, edges.get(&[p.min(q), p.max(q)]).map_or(k, |edge| edge.1));
         }
     }
     let mut number: HashMap<u32, usize> = HashMap::new();
     let mut shells: Vec<Shell> = Vec::new();
     for k in 0..triangles.len() as u32 {
         let next = shells.len();
-        let own = *number.entry(root(&mut of, k)).or_insert(next);
+        let own = *number.entry(joined.root(k)).or_insert(next);
         if own == next {
             let bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
             shells.push(Shell { triangles: Vec::new(), bounds, six: 0.0 });
@@ -123,7 +114,7 @@ pub(super) fn shells(
     }
     for shell in &mut shells {
         let all = shell.triangles.iter().map(|&k| triangles[k as usize]);
-        shell.bounds = bounds(all.clone().flatten().map(|n| &points[n as usize]));
+        shell.bounds = bounds(all.clone().flatten().map(|n| points[n as usize]));
         let at = |n: u32| Vector3::from(points[n as usize]) - Vector3::from(shell.bounds[0]);
         shell.six = all.map(|[a, b, c]| at(a).cross(&at(b)).dot(&at(c))).sum();
     }
@@ -149,7 +140,7 @@ fn is_closed(edges: &Edges) -> bool {
 
 /// Splits triangles at corners of others that lie on their edges, where the surface is open; how many.
 fn split(points: &[[f64; 3]], triangles: &mut Vec<[u32; 3]>, edges: &mut Edges) -> usize {
-    let [low, high] = bounds(points.iter());
+    let [low, high] = bounds(points.iter().copied());
     let near = WELD * (0..3).map(|d| high[d] - low[d]).fold(0.0, f64::max);
     let at = |n: u32| Vector3::from(points[n as usize]);
     let before = triangles.len();
@@ -271,15 +262,5 @@ fn extremes(shell: &Shell, points: &[[f64; 3]], triangles: &[[u32; 3]]) -> [[f64
             let middle = 0.5 * (low[e] + high[e]);
             at[e] + INWARDS * (1.0 + 0.3 * e as f64) * (middle - at[e])
         })
-    })
-}
-
-/// Box around points.
-pub(super) fn bounds<'a>(points: impl Iterator<Item = &'a [f64; 3]>) -> [[f64; 3]; 2] {
-    points.fold([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], |[mut low, mut high], point| {
-        for d in 0..3 {
-            (low[d], high[d]) = (low[d].min(point[d]), high[d].max(point[d]));
-        }
-        [low, high]
     })
 }

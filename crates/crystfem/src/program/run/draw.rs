@@ -1,8 +1,8 @@
 //! Pictures of the material alone (Figs 4.1, 4.4, 4.5).
 
-use super::celsius::{CELSIUS, of_kelvin};
 use crate::material::Semicrystalline;
 use crate::point::Curves;
+use crate::program::observe::celsius::{CELSIUS, of_kelvin};
 use harness::output::picture::{LinePlot, Series};
 use polycore::Error;
 use std::path::Path;

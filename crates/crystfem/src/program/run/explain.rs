@@ -2,6 +2,7 @@
 
 use super::Failure;
 use crate::boundary::{Condition, Where};
+use crate::program::observe::observers;
 use crate::program::scene::{PartScene, millimetres};
 use crate::simulation::Simulation;
 use harness::report::Named;
@@ -23,7 +24,7 @@ pub fn one(source: &Source, scene: &PartScene) -> Result<(Vec<String>, Vec<Named
     let task = scene.task(source, built)?;
     let cut = scene.cut_steps();
     lines.extend(task.notes.iter().chain(&cut).map(|note| format!("note       {note}")));
-    let quantities = scene.quantities(&task);
+    let quantities = observers(scene, &task).names();
     let mut problem = std::sync::Arc::unwrap_or_clone(task.problem);
     let births = problem.births.len();
     if births > 0 {
@@ -32,12 +33,7 @@ pub fn one(source: &Source, scene: &PartScene) -> Result<(Vec<String>, Vec<Named
             task.printed.len()
         ));
     }
-    let mut names: Vec<&str> = Vec::new();
-    for name in problem.materials.iter().flat_map(|m| m.field_names()) {
-        if !names.contains(name) {
-            names.push(name);
-        }
-    }
+    let names = problem.field_names();
     if !names.is_empty() {
         lines.push(format!("builds     states: {}", names.join(", ")));
     }
@@ -49,9 +45,9 @@ pub fn one(source: &Source, scene: &PartScene) -> Result<(Vec<String>, Vec<Named
         lines.push(format!(
             "builds     stress of {bearing} elements of {shapes} shapes, {} nodes on the bed{}; about 45 products of its matrix for each element whenever the free strain \
              changes by {:e}",
-            mechanics.bed.len(),
-            if mechanics.release { ", released at the end" } else { "" },
-            mechanics.strain_step
+            mechanics.settings.bed.len(),
+            if mechanics.settings.release { ", released at the end" } else { "" },
+            mechanics.settings.strain_step
         ));
     }
     if task.mechanics.as_ref().is_some_and(|mechanics| mechanics.stiff) {
@@ -64,7 +60,7 @@ pub fn one(source: &Source, scene: &PartScene) -> Result<(Vec<String>, Vec<Named
     if let Some(interfaces) = &task.interfaces {
         lines.push(format!(
             "builds     healing of {} interfaces, {}",
-            interfaces.list.len(),
+            interfaces.interfaces.len(),
             interfaces.law.explain()
         ));
     }

@@ -1,12 +1,12 @@
 //! Fits of measurements: constants with their intervals, tables, pictures.
 
 use super::Failure;
-use super::celsius::{CELSIUS, of_kelvin};
 use super::{fit_part, heat_flow};
 use crate::error::Error;
-use crate::fit::{Fit, Known, avrami, nakamura, ozawa};
+use crate::fit::{Fit, Known, MeasuredPeak, avrami, nakamura, ozawa};
+use crate::program::observe::celsius::{CELSIUS, of_kelvin};
 use crate::program::quantities as q;
-use crate::program::scene::{FitLaw, FitScene, FitSpec, Job, Measured};
+use crate::program::scene::{FitLaw, FitScene, FitSpec, Job};
 use harness::case::Finished;
 use harness::output::csv;
 use harness::output::picture::{LinePlot, Series};
@@ -96,7 +96,7 @@ pub fn run(source: &Source, scene: &FitScene, run: &mut harness::case::Run) -> R
 /// A fault of the scene or of its data.
 pub fn explain(source: &Source, scene: &FitScene) -> Result<Vec<String>, SceneError> {
     let jobs = scene.jobs(source)?;
-    let line = |(spec, (job, peaks)): (&FitSpec, &(Job, Vec<Measured>))| {
+    let line = |(spec, (job, peaks)): (&FitSpec, &(Job, Vec<MeasuredPeak>))| {
         let what = match job {
             Job::Avrami(times, _) => format!("k and n from {} measurements", times.len()),
             Job::Ozawa(coolings, temperatures) => {
@@ -115,7 +115,7 @@ pub fn explain(source: &Source, scene: &FitScene) -> Result<Vec<String>, SceneEr
                 format!("K0 and K_G from {rows} measurements in {file}, which runs for each trial")
             }
         };
-        let heat = |found: &Measured| format!("{:.4} J/g", found.peak.enthalpy / 1e3);
+        let heat = |found: &MeasuredPeak| format!("{:.4} J/g", found.peak.enthalpy / 1e3);
         let heats: Vec<String> = peaks.iter().map(heat).collect();
         let of = if heats.is_empty() { String::new() } else { format!("; peaks of {}", heats.join(", ")) };
         format!("fit {}: {:?}, {what}{of}", spec.name, spec.law)

@@ -1,15 +1,14 @@
 //! The model of a fit of a part: one simulation for each trial of its constants.
 
 use super::Failure;
-use super::celsius::CELSIUS;
-use super::probe::{self, Probe};
 use crate::error::Error;
 use crate::fit::{self, Fit};
 use crate::kinetics::Constants;
+use crate::program::observe::celsius::CELSIUS;
+use crate::program::observe::{Probe, record};
 use crate::program::scene::PartFit;
 use crate::simulation::Simulation;
 use std::cell::RefCell;
-use std::ops::ControlFlow;
 
 /// Fits the constants; `show` hears of each trial, and may end the fit.
 pub fn solve(
@@ -48,13 +47,8 @@ fn trial(job: &PartFit, constants: &Constants) -> Result<Vec<[f64; 2]>, Failure>
     let field = names.iter().position(|name| *name == "alpha").unwrap_or(0);
     let mut probes: Vec<Probe> =
         scene.probe.iter().zip(&task.probes).map(|(spec, place)| Probe::new(spec, place, fields)).collect();
-    probe::record(&mut probes, &simulation, &names)?;
-    let mut result = Ok(());
-    let _ = simulation.advance(task.end, &mut |simulation, _| {
-        result = probe::record(&mut probes, simulation, &names);
-        if result.is_err() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    })?;
-    result?;
+    record(&mut probes, &simulation, &names)?;
+    simulation.observe(task.end, |simulation| record(&mut probes, simulation, &names))?;
     let mut rows = Vec::new();
     for (probe, times, _) in &job.curves {
         let probe = &probes[*probe];

@@ -1,17 +1,18 @@
 //! Peaks of heat flows: enthalpies, tables, pictures.
 
-use super::celsius::of_kelvin;
+use crate::fit::MeasuredPeak;
+use crate::program::observe::celsius::of_kelvin;
 use crate::program::quantities as q;
-use crate::program::scene::{FitSpec, Measured};
+use crate::program::scene::FitSpec;
 use harness::output::csv;
 use harness::output::picture::{LinePlot, Series};
 use harness::report::Report;
 use std::path::Path;
 
 /// Enthalpies and degrees of crystallinity of a fit's files.
-pub fn record(report: &mut Report, spec: &FitSpec, peaks: &[Measured]) {
+pub fn record(report: &mut Report, spec: &FitSpec, peaks: &[MeasuredPeak]) {
     let perfect = spec.heat_flow.as_ref().and_then(|flow| flow.latent_heat);
-    for (index, Measured { peak, .. }) in peaks.iter().enumerate() {
+    for (index, MeasuredPeak { peak, .. }) in peaks.iter().enumerate() {
         let run = (index + 1).to_string();
         report.value(q::ENTHALPY.of(&[&spec.name, &run]), peak.enthalpy / 1e3);
         if let Some(perfect) = perfect {
@@ -21,7 +22,12 @@ pub fn record(report: &mut Report, spec: &FitSpec, peaks: &[Measured]) {
 }
 
 /// NAME-heat-flow.csv and .png: heat given off, its baseline and α; nothing without peaks.
-pub fn write(output: &Path, name: &str, peaks: &[Measured], picture: bool) -> Result<(), polycore::Error> {
+pub fn write(
+    output: &Path,
+    name: &str,
+    peaks: &[MeasuredPeak],
+    picture: bool,
+) -> Result<(), polycore::Error> {
     let Some(first) = peaks.first() else { return Ok(()) };
     let mut columns: Vec<(&str, &str, Vec<f64>)> = vec![
         ("run", "", Vec::new()),
@@ -37,7 +43,7 @@ pub fn write(output: &Path, name: &str, peaks: &[Measured], picture: bool) -> Re
     let axis = if cooling { "temperature (°C)" } else { "time (s)" };
     let mut plot = LinePlot::new(name).axes(axis, "heat given off (W/g)").size(800.0, 460.0);
     let mut under = [Vec::new(), Vec::new()];
-    for (index, Measured { peak, temperatures, .. }) in peaks.iter().enumerate() {
+    for (index, MeasuredPeak { peak, temperatures, .. }) in peaks.iter().enumerate() {
         let per_gram = |flows: &[f64]| flows.iter().map(|q| q / 1e3).collect::<Vec<f64>>();
         let [flows, baseline] = [per_gram(&peak.flows), per_gram(&peak.baseline)];
         let celsius = of_kelvin(temperatures);

@@ -1,24 +1,15 @@
 //! Whole scenes: run, compared, drawn and judged.
 
-mod animation;
-pub(crate) mod celsius;
 mod draw;
 mod explain;
 mod fit;
 mod fit_part;
-mod healing;
 mod heat_flow;
-mod line;
-mod mechanics;
 mod nodes;
-mod outside;
 mod part;
 mod point;
-mod probe;
 mod program;
-mod section;
 mod suite;
-mod warped;
 
 pub use program::Crystfem;
 

@@ -1,62 +1,22 @@
 //! Crystallinity at the nodes of a thermal analysis that another program made.
 
-use super::celsius::CELSIUS;
 use crate::error::Error;
-use crate::material::{Point, ThermalMaterial};
+use crate::material::ThermalMaterial;
+use crate::point::MaterialPoint;
+use crate::program::observe::celsius::CELSIUS;
 use crate::program::quantities as q;
 use crate::program::scene::NodesSpec;
 use crate::program::thermal;
 use harness::output::vtkhdf::MeshSeries;
 use harness::report::{Quantity, Report};
-use nalgebra::Vector3;
+use polycore::numerics::range;
 use rayon::prelude::*;
 use std::path::Path;
 
-/// Largest change of temperature in a step of a history that is linear between its times, K.
-const STEP: f64 = 0.25;
-/// Steps between two times at most.
-const MOST: f64 = 10_000.0;
 /// Relative crystallinities whose temperature is a value.
 const DEGREES: [f64; 3] = [0.01, 0.5, 0.99];
 
-/// A node: its temperature, its state, and the temperatures at which it reached [`DEGREES`].
-#[derive(Clone)]
-struct Node {
-    temperature: f64,
-    state: Vec<f64>,
-    fields: Vec<f64>,
-    reached: [f64; 3],
-}
-
-impl Node {
-    /// Over a linear change of temperature.
-    fn advance(&mut self, material: &dyn ThermalMaterial, to: f64, duration: f64) -> Result<(), Error> {
-        let change = to - self.temperature;
-        let steps = (change.abs() / STEP).ceil().clamp(1.0, MOST);
-        for _ in 0..steps as usize {
-            let (increment, dt) = (change / steps, duration / steps);
-            let at = Point { temperature: self.temperature, increment, gradient: Vector3::zeros(), dt };
-            let (old, before) = (self.state.clone(), self.fields[0]);
-            material.respond(&at, &old, &mut self.state)?;
-            material.fields(&self.state, &mut self.fields);
-            for (reached, degree) in self.reached.iter_mut().zip(DEGREES) {
-                if reached.is_nan() && self.fields[0] >= degree {
-                    *reached = self.temperature + increment * part(before, self.fields[0], degree);
-                }
-            }
-            self.temperature += increment;
-        }
-        self.temperature = to;
-        Ok(())
-    }
-}
-
-/// Where between two values of α a value lies: in ln(−ln(1 − α)), which Avrami's law makes linear in ln t.
-fn part(before: f64, after: f64, degree: f64) -> f64 {
-    let of = |alpha: f64| (-(-alpha).ln_1p()).ln();
-    let part = (of(degree) - of(before)) / (of(after) - of(before));
-    if part.is_finite() { part } else { (degree - before) / (after - before) }
-}
+type Node = MaterialPoint<3>;
 
 /// What a file holds: its mesh, and its temperatures at the first time. Files of later times are there, but not read.
 ///
@@ -68,8 +28,7 @@ pub fn explain(spec: &NodesSpec, path: &Path) -> Result<String, Error> {
         return Err(none(path));
     };
     kelvin(spec, path, &first)?;
-    let span = |pick: fn(f64, f64) -> f64, start| first.temperature.iter().copied().fold(start, pick);
-    let [low, high] = [span(f64::min, f64::INFINITY), span(f64::max, f64::NEG_INFINITY)];
+    let [low, high] = range(first.temperature.iter().copied());
     let unit = if spec.zero() == 0.0 { "K" } else { "°C" };
     let (nodes, cells, time) = (analysis.points.len(), analysis.cells.len(), first.time);
     let file = spec.file.display();
@@ -117,11 +76,7 @@ pub fn run(
         if nodes.is_empty() {
             let fresh = |value: &f64| {
                 let start = spec.start.map_or(*value, |start| start.si());
-                let mut state = vec![0.0; material.state_names().len()];
-                material.initial_state(start, &mut state);
-                let mut fields = vec![0.0; material.field_names().len()];
-                material.fields(&state, &mut fields);
-                Node { temperature: start, state, fields, reached: [f64::NAN; 3] }
+                Node::new(material, start, DEGREES)
             };
             nodes = values.iter().map(fresh).collect();
             time = if spec.start.is_some() { 0.0 } else { frame.time };

@@ -1,15 +1,16 @@
 //! The material alone: curves, events, pictures.
 
 use super::Failure;
-use super::celsius::CELSIUS;
 use super::draw::{self, Run};
 use crate::error::Error;
 use crate::point::{Course, Curves, Drive, Event, Stepping};
+use crate::program::observe::celsius::CELSIUS;
 use crate::program::quantities as q;
 use crate::program::scene::{NodesSpec, PointScene};
 use harness::output::csv;
 use harness::report::{Phases, Quantity, Report};
 use harness::scene::{SceneError, Source};
+use polycore::numerics::range;
 use std::path::Path;
 
 /// Relative crystallinities whose temperature and time are values of the report.
@@ -162,9 +163,7 @@ fn record(report: &mut Report, name: &str, course: &Course, curves: &Curves) -> 
     let last = rows - 1;
     let named = |quantity: &str| format!("{name}.{quantity}");
     report.work(&named("steps"), last as u64).work(&named("rejected"), curves.rejected as u64);
-    let span = |values: &[f64]| {
-        values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &x| [low.min(x), high.max(x)])
-    };
+    let span = |values: &[f64]| range(values.iter().copied());
     let of = |quantity: Quantity| quantity.of(&[name]);
     let [coldest, hottest] = span(&curves.temperature);
     report.value(of(q::COLDEST), coldest - CELSIUS);

@@ -20,7 +20,7 @@ impl Case for Crystfem {
   crystfem resume out/printed-bar                   continue an interrupted run
   crystfem sweep cases/ch4/printed-bar/case.toml --vary print.layer_time=10s,20s,40s
   crystfem schema > crystfem.schema.json            for editors",
-        magic: b"part-ck6",
+        magic: b"part-ck7",
         columns: &[],
     };
     type Error = Error;

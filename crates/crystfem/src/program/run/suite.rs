@@ -2,6 +2,7 @@
 
 use super::{Crystfem, Failure, part};
 use crate::error::Error;
+use crate::program::observe::observers;
 use crate::program::quantities as q;
 use crate::program::scene::PartScene;
 use harness::case::{Case, Fault, Finished, Options, Row, Rows, Run};
@@ -31,7 +32,7 @@ pub fn run(source: &Source, scene: &PartScene, run: &mut Run) -> Result<Finished
             if study.expect_error.is_none() {
                 let (source, scene) = scene.of_study(source, index)?;
                 let task = scene.task(&source, scene.mesh.build(&source)?)?;
-                names.extend(of_study(&study.name, scene.quantities(&task)));
+                names.extend(of_study(&study.name, observers(&scene, &task).names()));
             }
         }
         scene.check_expectations(source, &names, &left_out(scene, &studies))?;

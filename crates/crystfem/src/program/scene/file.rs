@@ -42,7 +42,7 @@ pub(super) fn timed(
 ) -> Result<ToolPath, SceneError> {
     let (path, with) = match (acceleration, jerk) {
         (None, None) => {
-            match path.limits_told() {
+            match path.describe_limits() {
                 Some(limits) => {
                     notes.push(format!(
                         "times by the limits that the file states: {limits}; waits for temperatures left out"

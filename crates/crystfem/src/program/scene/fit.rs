@@ -1,19 +1,15 @@
 //! The scene of a fit.
 
-use super::fault::{located, located_in};
+use super::fault::located_in;
 use super::fit_part::PartFit;
-use super::fit_spec::{FitLaw, FitSpec, temperature, time};
-use super::heat_flow::Measured;
+use super::fit_spec::{FitLaw, FitSpec, alpha, table, temperature, time};
 use super::material::KINETICS_KEYS;
 use super::{OutputSpec, Program, check_name};
-use crate::fit::{Cooling, DEGREES, Known, Run};
+use crate::fit::{Cooling, Known, MeasuredPeak, Run};
 use crate::kinetics::{Constants, Kinetics};
-use crate::table::{Column, read};
 use harness::report::Expect;
 use harness::scene::{SceneError, Source};
-use polycore::units::dimension::RatioDimension;
 use serde::Deserialize;
-use std::path::Path;
 
 /// A whole scene.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
@@ -51,7 +47,7 @@ impl FitScene {
     ///
     /// # Errors
     /// A [`SceneError`] that names the key, the value found and what is allowed; for data, file, line and column.
-    pub fn jobs(&self, source: &Source) -> Result<Vec<(Job, Vec<Measured>)>, SceneError> {
+    pub fn jobs(&self, source: &Source) -> Result<Vec<(Job, Vec<MeasuredPeak>)>, SceneError> {
         if self.fit.is_empty() {
             return Err(source.error("fit", "nothing", "at least one [[fit]]"));
         }
@@ -81,7 +77,7 @@ impl FitScene {
             let measured = |flow| {
                 (0..fit.data.len()).map(|i| fit.measured(source, &key, flow, i)).collect::<Result<_, _>>()
             };
-            let peaks: Vec<Measured> = fit.heat_flow.as_ref().map_or(Ok(Vec::new()), measured)?;
+            let peaks: Vec<MeasuredPeak> = fit.heat_flow.as_ref().map_or(Ok(Vec::new()), measured)?;
             jobs.push((fit.job(source, &key, &peaks)?, peaks));
         }
         Ok(jobs)
@@ -148,11 +144,11 @@ impl FitSpec {
         &self,
         source: &Source,
         key: &dyn Fn(&str) -> String,
-        peaks: &[Measured],
+        peaks: &[MeasuredPeak],
     ) -> Result<Job, SceneError> {
         match self.law {
             FitLaw::Avrami => {
-                if let [Measured { peak, .. }] = peaks {
+                if let [MeasuredPeak { peak, .. }] = peaks {
                     let times = peak.times.iter().map(|time| time - peak.times[0]).collect();
                     return Ok(Job::Avrami(times, peak.degrees.clone()));
                 }
@@ -190,12 +186,7 @@ impl FitSpec {
                             let run = Run::cooling(rate.si(), temperatures, degrees, &known);
                             run.map_err(|error| source.error(&at, error, "temperatures that fall"))?
                         }
-                        (None, Some(Measured { peak, temperatures, history })) => Run {
-                            times: peak.times.clone(),
-                            temperatures: temperatures.clone(),
-                            degrees: peak.degrees.clone(),
-                            history: history.clone(),
-                        },
+                        (None, Some(found)) => found.run(),
                         (None, None) => {
                             let columns = [time(), temperature(), alpha()];
                             let [times, temperatures, degrees] = table(source, &at, &data.file, columns)?;
@@ -243,18 +234,4 @@ impl FitSpec {
         Kinetics::new(trial).map_err(|error| located_in(source, block, &KINETICS_KEYS, &error))?;
         Ok(known)
     }
-}
-
-pub(super) fn alpha() -> Column {
-    Column::of::<RatioDimension>("alpha").within(DEGREES[0], DEGREES[1])
-}
-
-/// Reads a table beside the scene.
-pub(super) fn table<const N: usize>(
-    source: &Source,
-    key: &str,
-    file: &Path,
-    columns: [Column; N],
-) -> Result<[Vec<f64>; N], SceneError> {
-    read(&source.file(file), columns).map_err(|error| located(source, key, &error))
 }

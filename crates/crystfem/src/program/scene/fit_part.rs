@@ -1,7 +1,6 @@
 //! A fit whose model is a part of another scene.
 
-use super::fit::{alpha, table};
-use super::fit_spec::{FitSpec, time};
+use super::fit_spec::{FitSpec, alpha, table, time};
 use super::material::KineticsSpec;
 use super::{Kind, PartScene};
 use crate::kinetics::Constants;

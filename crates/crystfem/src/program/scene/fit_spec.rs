@@ -1,12 +1,14 @@
 //! What a scene of a fit says.
 
-use crate::fit::Baseline;
-use crate::table::Column;
-use polycore::units::dimension::{TemperatureDimension, TimeDimension};
+use super::fault::located;
+use crate::fit::{Baseline, DEGREES};
+use crate::table::{Column, read};
+use harness::scene::{SceneError, Source};
+use polycore::units::dimension::{RatioDimension, TemperatureDimension, TimeDimension};
 use polycore::units::{Mass, MolarEnergy, SpecificEnergy, Temperature, TemperatureRate, Time};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Laws that can be fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
@@ -122,4 +124,19 @@ pub(super) fn time() -> Column {
 
 pub(super) fn temperature() -> Column {
     Column::of::<TemperatureDimension>("temperature")
+}
+
+/// Column of α.
+pub(super) fn alpha() -> Column {
+    Column::of::<RatioDimension>("alpha").within(DEGREES[0], DEGREES[1])
+}
+
+/// Reads a table beside the scene.
+pub(super) fn table<const N: usize>(
+    source: &Source,
+    key: &str,
+    file: &Path,
+    columns: [Column; N],
+) -> Result<[Vec<f64>; N], SceneError> {
+    read(&source.file(file), columns).map_err(|error| located(source, key, &error))
 }

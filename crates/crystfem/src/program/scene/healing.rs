@@ -2,10 +2,11 @@
 
 use super::PartScene;
 use super::fault::located_in;
+use crate::coupling::HealingSettings;
 use crate::error::Error;
 use crate::healing::{Glass, Healing};
 use crate::mesh::Mesh;
-use crate::mesh::surface::{Surface, area};
+use crate::problem::Birth;
 use harness::scene::{SceneError, Source};
 use polycore::units::{MolarEnergy, Stress, Temperature, TemperatureDifference, Time};
 use serde::Deserialize;
@@ -56,28 +57,6 @@ pub enum Shift {
     Arrhenius,
 }
 
-/// An interface between two elements.
-pub struct Interface {
-    /// The elements.
-    pub sides: [u32; 2],
-    /// The corners that they share.
-    pub nodes: Vec<u32>,
-    /// m².
-    pub area: f64,
-}
-
-/// What heals.
-pub struct Interfaces {
-    /// How fast.
-    pub law: Healing,
-    /// Strength of the material, Pa.
-    pub strength: Option<f64>,
-    /// Between elements that appear at different times.
-    pub list: Vec<Interface>,
-    /// Elements that are printed of this material.
-    pub printed: Vec<bool>,
-}
-
 impl HealingSpec {
     /// The law, of a material whose glass transition is about `transition`, K.
     fn law(&self, transition: f64) -> Result<Healing, Error> {
@@ -94,17 +73,17 @@ impl HealingSpec {
 }
 
 impl PartScene {
-    /// The interfaces of a scene, where it asks for their healing; `births` are the elements of each birth.
+    /// The interfaces of a scene, where it asks for their healing; `births` are those of its print.
     ///
     /// # Errors
     /// A [`SceneError`] for another material, constants out of their domain, and a part without interfaces.
-    pub(super) fn interfaces<'a>(
+    pub(super) fn interfaces(
         &self,
         source: &Source,
         mesh: &Mesh,
         material_of: &[u16],
-        births: impl Iterator<Item = &'a [u32]>,
-    ) -> Result<Option<Interfaces>, SceneError> {
+        births: &[Birth],
+    ) -> Result<Option<HealingSettings>, SceneError> {
         let Some(spec) = &self.healing else { return Ok(None) };
         let known: Vec<&str> = self.materials.keys().map(String::as_str).collect();
         let Some(index) = known.iter().position(|name| *name == spec.material) else {
@@ -123,28 +102,9 @@ impl PartScene {
         if let Some(found) = strength.filter(|strength| !(*strength > 0.0 && strength.is_finite())) {
             return Err(source.error("healing.strength", format!("{found} Pa"), "above 0"));
         }
-        let mut birth_of = vec![u32::MAX; mesh.element_count()];
-        for (number, elements) in (0..).zip(births) {
-            elements.iter().for_each(|&element| birth_of[element as usize] = number);
-        }
-        let births = birth_of.iter().zip(material_of);
-        let printed: Vec<bool> =
-            births.map(|(&birth, &of)| usize::from(of) == index && birth != u32::MAX).collect();
-        let surface = Surface::of_all(mesh).map_err(|error| source.refused("mesh", error.to_string()))?;
-        let mut list = Vec::new();
-        for element in 0..mesh.element_count() as u32 {
-            if !printed[element as usize] {
-                continue;
-            }
-            for face in mesh.faces_of(element) {
-                let Some(other) = surface.opposite(face).map(|face| face.element) else { continue };
-                if printed[other as usize] && birth_of[other as usize] < birth_of[element as usize] {
-                    let nodes = mesh.face_nodes(face).to_vec();
-                    list.push(Interface { sides: [element, other], nodes, area: area(mesh, face) });
-                }
-            }
-        }
-        if list.is_empty() {
+        let settings = HealingSettings::new(mesh, material_of, births, index as u16, law)
+            .map_err(|error| source.refused("mesh", error.to_string()))?;
+        if settings.interfaces.is_empty() {
             let found = format!("no two births of `{}` that touch", spec.material);
             return Err(source.error(
                 "healing.material",
@@ -152,6 +112,6 @@ impl PartScene {
                 "the material of a [print] with several births",
             ));
         }
-        Ok(Some(Interfaces { law, strength, list, printed }))
+        Ok(Some(HealingSettings { strength, ..settings }))
     }
 }

@@ -3,29 +3,15 @@
 use super::fault::located;
 use super::fit_spec::{DataSpec, Direction, FitLaw, FitSpec, HeatFlowSpec, Limit, temperature, time};
 use crate::error::Error;
-use crate::fit::{Peak, at};
-use crate::program::run::celsius::CELSIUS;
+use crate::fit::{MeasuredPeak, Thermogram};
 use crate::table::{Column, read_with_lines};
 use harness::scene::{SceneError, Source};
 use polycore::units::dimension::{PowerDimension, SpecificPowerDimension};
 use std::path::Path;
 
-/// The peak of a file.
-#[derive(Clone, Debug)]
-pub struct Measured {
-    /// Between the limits.
-    pub peak: Peak,
-    /// Temperatures there, K; empty of an isothermal run.
-    pub temperatures: Vec<f64>,
-    /// Times, s, and temperatures, K, of the rows before it, from the last one at which nothing can crystallize.
-    pub history: Vec<[f64; 2]>,
-}
-
-/// Times, temperatures (none of an isothermal run), heat flows and lines of a file.
+/// Heat flows and lines of a file.
 struct Table {
-    times: Vec<f64>,
-    temperatures: Vec<f64>,
-    flows: Vec<f64>,
+    measured: Thermogram,
     lines: Vec<usize>,
 }
 
@@ -69,22 +55,23 @@ impl FitSpec {
         key: &dyn Fn(&str) -> String,
         flow: &HeatFlowSpec,
         i: usize,
-    ) -> Result<Measured, SceneError> {
+    ) -> Result<MeasuredPeak, SceneError> {
         let data = &self.data[i];
         let at_key = |field: &str| key(&format!("data[{i}].{field}"));
         let path = source.file(&data.file);
-        let table = self.read_flow(source, &path, data, &at_key)?;
-        if let Some(row) = (1..table.times.len()).find(|&row| table.times[row] < table.times[row - 1]) {
+        let mut table = self.read_flow(source, &path, data, &at_key)?;
+        let times = &table.measured.times;
+        if let Some(row) = (1..times.len()).find(|&row| times[row] < times[row - 1]) {
             let error = Error::File {
                 line: table.lines[row],
                 what: "column `time`".into(),
-                found: format!("{} s", table.times[row]),
-                allowed: format!("{} s or later: times in ascending order", table.times[row - 1]),
+                found: format!("{} s", times[row]),
+                allowed: format!("{} s or later: times in ascending order", times[row - 1]),
                 path,
             };
             return Err(located(source, &at_key("file"), &error));
         }
-        let [first, last] = [table.times[0], table.times[table.times.len() - 1]];
+        let [first, last] = [times[0], times[times.len() - 1]];
         let from = table.limit(data.from, first, first).map_err(|why| why.at(source, &at_key("from")))?;
         let to = table.limit(data.to, last, from).map_err(|why| why.at(source, &at_key("to")))?;
         if from >= to {
@@ -93,29 +80,17 @@ impl FitSpec {
         }
         let sign = if flow.exothermal == Direction::Up { 1.0 } else { -1.0 };
         let per_mass = sign / data.mass.map_or(1.0, |mass| mass.si());
-        let flows: Vec<f64> = table.flows.iter().map(|flow| per_mass * flow).collect();
-        let peak =
-            Peak::of(&table.times, &flows, [from, to], flow.baseline).map_err(|error| match &error {
-                Error::Parameter { allowed, found, .. } => {
-                    let direction = format!("{:?}", flow.exothermal).to_lowercase();
-                    let found =
-                        format!("`{direction}`, by which {} has {found:.4e} J/kg", data.file.display());
-                    source.error(&key("heat_flow.exothermal"), found, allowed)
-                }
-                _ => located(source, &at_key("file"), &error),
-            })?;
-        let isothermal = table.temperatures.is_empty();
-        let along = |time: &f64| at(&table.times, &table.temperatures, *time);
-        let temperatures: Vec<f64> =
-            if isothermal { Vec::new() } else { peak.times.iter().map(along).collect() };
+        table.measured.flows.iter_mut().for_each(|flow| *flow *= per_mass);
         // what lies before it in the melt has no part in it
         let melting = self.equilibrium_melting.map_or(f64::INFINITY, |melting| melting.si());
-        let rows =
-            table.times.iter().zip(&table.temperatures).map(|(&time, &temperature)| [time, temperature]);
-        let mut history: Vec<[f64; 2]> = rows.take_while(|[time, _]| *time <= from).collect();
-        let molten = history.iter().rposition(|[_, temperature]| *temperature >= melting).unwrap_or(0);
-        history.drain(..molten);
-        Ok(Measured { peak, temperatures, history })
+        table.measured.peak([from, to], flow.baseline, melting).map_err(|error| match &error {
+            Error::Parameter { allowed, found, .. } => {
+                let direction = format!("{:?}", flow.exothermal).to_lowercase();
+                let found = format!("`{direction}`, by which {} has {found:.4e} J/kg", data.file.display());
+                source.error(&key("heat_flow.exothermal"), found, allowed)
+            }
+            _ => located(source, &at_key("file"), &error),
+        })
     }
 
     /// Reads a file; a mass must be given of heat flows in watts, and not of others.
@@ -133,11 +108,11 @@ impl FitSpec {
             };
             if self.law == FitLaw::Avrami {
                 let ([times, flows], lines) = read_with_lines(path, [time(), heat_flow])?;
-                return Ok(Table { times, temperatures: Vec::new(), flows, lines });
+                return Ok(Table { measured: Thermogram { times, temperatures: Vec::new(), flows }, lines });
             }
             let columns = [time(), temperature(), heat_flow];
             let ([times, temperatures, flows], lines) = read_with_lines(path, columns)?;
-            Ok(Table { times, temperatures, flows, lines })
+            Ok(Table { measured: Thermogram { times, temperatures, flows }, lines })
         };
         let error: Error = match read(data.mass.is_none()) {
             Ok(table) => return Ok(table),
@@ -171,7 +146,8 @@ impl Refused {
 impl Table {
     /// The time of a limit: the first one after `start` at which a temperature is passed on cooling.
     fn limit(&self, limit: Option<Limit>, default: f64, start: f64) -> Result<f64, Refused> {
-        let [first, last] = [self.times[0], self.times[self.times.len() - 1]];
+        let Thermogram { times, temperatures, .. } = &self.measured;
+        let [first, last] = [times[0], times[times.len() - 1]];
         match limit {
             None => Ok(default),
             Some(Limit::Time(time)) if (first..=last).contains(&time.si()) => Ok(time.si()),
@@ -179,22 +155,16 @@ impl Table {
                 let allowed = format!("{first} to {last} s, the times of the file");
                 Err(Refused([format!("{} s", time.si()), allowed]))
             }
-            Some(Limit::Temperature(_)) if self.temperatures.is_empty() => {
+            Some(Limit::Temperature(_)) if temperatures.is_empty() => {
                 let found = "a temperature in an isothermal run".to_owned();
                 Err(Refused([found, format!("a time, {first} to {last} s")]))
             }
             Some(Limit::Temperature(wanted)) => {
                 let wanted = wanted.si();
-                let passed = (1..self.times.len()).find_map(|row| {
-                    let [above, below] = [self.temperatures[row - 1], self.temperatures[row]];
-                    let share = (above - wanted) / (above - below);
-                    let time = self.times[row - 1] + share * (self.times[row] - self.times[row - 1]);
-                    (above >= wanted && wanted >= below && above > below && time >= start).then_some(time)
-                });
-                passed.ok_or_else(|| {
-                    let celsius = |kelvin: f64| kelvin - CELSIUS;
-                    let low = self.temperatures.iter().fold(f64::INFINITY, |low, &t| low.min(t));
-                    let high = self.temperatures.iter().fold(0.0, |high: f64, &t| high.max(t));
+                self.measured.passes(wanted, start).ok_or_else(|| {
+                    let celsius = |kelvin: f64| kelvin - 273.15;
+                    let low = temperatures.iter().fold(f64::INFINITY, |low, &t| low.min(t));
+                    let high = temperatures.iter().fold(0.0, |high: f64, &t| high.max(t));
                     let found = format!("{:.2} degC", celsius(wanted));
                     let allowed = "a temperature that the file falls through, `to` after `from`";
                     let range = format!("it has {:.2} to {:.2} degC", celsius(low), celsius(high));

@@ -2,17 +2,14 @@
 
 use super::PartScene;
 use super::fault::located;
+use crate::coupling::{STRAIN_STEP, StressSettings, loose_elements};
 use crate::mechanics::{SolidifyingMaxwell, is_known, key};
 use crate::mesh::Mesh;
 use crate::mesh::path::ToolPath;
-use crate::mesh::surface::Surface;
 use harness::scene::{SceneError, Source};
 use polycore::units::{PerTemperature, Ratio, Stress};
 use serde::Deserialize;
-use std::collections::{HashMap, HashSet};
-
-/// Largest change of the free strain between two solutions, unless a scene says otherwise.
-const STRAIN_STEP: f64 = 2e-4;
+use std::collections::HashSet;
 
 /// Bytes of the matrices of a hexahedron, and of tetrahedra of 4 and 10 nodes.
 const HEXAHEDRON: f64 = 26e3;
@@ -91,26 +88,16 @@ impl MechanicsLaw {
     }
 }
 
-/// What is solved beside the heat.
+/// Stress beside the heat, and what it needs.
 pub struct Mechanics {
-    /// The law.
-    pub law: SolidifyingMaxwell,
-    /// Relative crystallinity α of fresh material.
-    pub fresh: f64,
-    /// Of each element, whether it bears stress.
-    pub bears: Vec<bool>,
-    /// How many do, and of how many shapes all elements are.
+    /// The part that bears stress.
+    pub settings: StressSettings,
+    /// Numbers of elements that bear stress, and of shapes of all elements.
     pub counts: [usize; 2],
     /// Bytes of the matrices of all shapes.
     pub matrices: f64,
     /// Whether all that bears stress are tetrahedra of 4 nodes, which are too stiff.
     pub stiff: bool,
-    /// Nodes on the bed.
-    pub bed: Vec<u32>,
-    /// See [`MechanicsSpec`].
-    pub strain_step: f64,
-    /// See [`MechanicsSpec`].
-    pub release: bool,
 }
 
 impl PartScene {
@@ -152,33 +139,17 @@ impl PartScene {
                            `cells` of a bar or brick, any mesher)";
             return Err(source.error("mechanics", found, allowed));
         }
-        let nodes_of = |own: bool| -> HashSet<u32> {
-            let chosen = (0..bears.len() as u32).filter(|&element| bears[element as usize] == own);
-            chosen.flat_map(|element| mesh.nodes(element).iter().copied()).collect()
-        };
-        let own = nodes_of(true);
-        let mut bed: Vec<u32> = match &spec.bed {
-            Some(name) => {
-                let fault = |error| located(source, "mechanics.bed", &error);
-                let surface = Surface::of_all(mesh).map_err(fault)?;
-                let region = surface.region(mesh, name).map_err(fault)?;
-                let faces = surface.all_in(&region);
-                faces
-                    .iter()
-                    .flat_map(|face| mesh.face_nodes(*face).to_vec())
-                    .filter(|node| own.contains(node))
-                    .collect()
-            }
-            None => nodes_of(false).intersection(&own).copied().collect(),
-        };
-        bed.sort_unstable();
-        bed.dedup();
+        let share = |given: Option<Ratio>| given.map_or(0.0, |ratio| ratio.si());
+        let law = spec.law.solve(source, share(material.crystallinity))?;
+        let settings = StressSettings::new(mesh, law, bears, spec.bed.as_deref())
+            .map_err(|error| located(source, "mechanics.bed", &error))?;
+        let StressSettings { bears, bed, .. } = &settings;
         if bed.len() < 3 {
             let found = format!("{} nodes of the part on the bed", bed.len());
             let allowed = "at least 3: a surface of the part, or another material below it";
             return Err(source.error("mechanics.bed", found, allowed));
         }
-        let loose = loose(mesh, &bears, &bed);
+        let loose = loose_elements(mesh, bears, bed);
         if loose > 0 {
             let found = format!("{loose} elements that nothing connects with the bed");
             let mut allowed = "a part that hangs together and touches the bed".to_owned();
@@ -203,39 +174,13 @@ impl PartScene {
             .iter()
             .map(|(nodes, _)| if *nodes == 8 { HEXAHEDRON } else { TETRAHEDRON[usize::from(*nodes > 4)] });
         let matrices = matrices.sum();
-        let stiff = all().zip(&bears).all(|(nodes, bears)| nodes.len() == 4 || !bears);
-        let share = |given: Option<Ratio>| given.map_or(0.0, |ratio| ratio.si());
-        let law = spec.law.solve(source, share(material.crystallinity))?;
-        let fresh = share(material.initial_alpha);
-        Ok(Some(Mechanics {
-            law,
-            fresh,
-            bears,
-            counts,
-            matrices,
-            stiff,
-            bed,
+        let stiff = all().zip(bears).all(|(nodes, bears)| nodes.len() == 4 || !bears);
+        let settings = StressSettings {
+            initial_alpha: share(material.initial_alpha),
             strain_step,
             release: spec.release,
-        }))
+            ..settings
+        };
+        Ok(Some(Mechanics { settings, counts, matrices, stiff }))
     }
-}
-
-/// How many of the elements that bear stress have no way to a node of the bed, through nodes they share.
-fn loose(mesh: &Mesh, bears: &[bool], bed: &[u32]) -> usize {
-    let mut around: HashMap<u32, Vec<u32>> = HashMap::new();
-    let own = || (0..bears.len() as u32).filter(|&element| bears[element as usize]);
-    for element in own() {
-        mesh.nodes(element).iter().for_each(|&node| around.entry(node).or_default().push(element));
-    }
-    let mut reached = vec![false; bears.len()];
-    let mut next: Vec<u32> = bed.to_vec();
-    while let Some(node) = next.pop() {
-        for element in around.remove(&node).unwrap_or_default() {
-            if !std::mem::replace(&mut reached[element as usize], true) {
-                next.extend(mesh.nodes(element));
-            }
-        }
-    }
-    own().filter(|&element| !reached[element as usize]).count()
 }

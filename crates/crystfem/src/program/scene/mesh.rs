@@ -2,7 +2,7 @@
 
 use super::fault::{located, located_in};
 use super::memory;
-use super::voxels::{Filling, PRINTED, PathSpec, StlSpec, box_of};
+use super::voxels::{BuiltMesh, PRINTED, PathSpec, StlSpec, box_of};
 use crate::error::Error;
 use crate::mesh::{Bar, Block, Grid, Mesh, Split, Substrate, Tube, quality, read};
 use harness::scene::{SceneError, Source};
@@ -128,24 +128,12 @@ pub struct TubeSpec {
     pub elements: [usize; 3],
 }
 
-/// A mesh, and what should be looked at.
-pub struct Built {
-    /// The mesh.
-    pub mesh: Mesh,
-    /// Notes for the user.
-    pub notes: Vec<String>,
-    /// Volume of all elements, m³.
-    pub volume: f64,
-    /// How full the elements of a path or an STL surface are.
-    pub filling: Option<Filling>,
-}
-
 impl MeshSpec {
     /// The mesh, checked.
     ///
     /// # Errors
     /// A [`SceneError`] for none or several of the alternatives, and for what the mesh refuses.
-    pub fn build(&self, source: &Source) -> Result<Built, SceneError> {
+    pub fn build(&self, source: &Source) -> Result<BuiltMesh, SceneError> {
         let mut built = self.first_order(source)?;
         match self.order {
             None | Some(1) => {}
@@ -157,7 +145,7 @@ impl MeshSpec {
         Ok(built)
     }
 
-    fn first_order(&self, source: &Source) -> Result<Built, SceneError> {
+    fn first_order(&self, source: &Source) -> Result<BuiltMesh, SceneError> {
         let structured = [self.bar.is_some(), self.brick.is_some(), self.tube.is_some()];
         let from_files = [self.file.is_some(), self.path.is_some(), self.stl.is_some()];
         let kinds = structured.into_iter().chain(from_files);
@@ -207,11 +195,11 @@ impl MeshSpec {
             }
             notes.extend(found.mesh.bounds().map(|bounds| format!("the part is {}", box_of(bounds))));
             notes.extend(found.quality.notes.clone());
-            return Ok(Built { volume: found.quality.volume, mesh: found.mesh, notes, filling: None });
+            return Ok(BuiltMesh { volume: found.quality.volume, mesh: found.mesh, notes, filling: None });
         };
         let found = quality::check(&mesh, None).map_err(|error| at("mesh", error))?;
         notes.extend(found.notes);
-        Ok(Built { mesh, notes, volume: found.volume, filling: None })
+        Ok(BuiltMesh { mesh, notes, volume: found.volume, filling: None })
     }
 }
 

@@ -31,18 +31,17 @@ pub use curve::CurveSpec;
 pub use fit::{FitScene, Job};
 pub use fit_part::PartFit;
 pub use fit_spec::{DataSpec, Direction, FitLaw, FitSpec, HeatFlowSpec, Limit};
-pub use healing::{HealingSpec, Interface, Interfaces};
-pub use heat_flow::Measured;
+pub use healing::HealingSpec;
 pub use material::{KineticsSpec, Law, MaterialSpec, MeltingSpec, PropertySpec, SignSpec};
 pub use mechanics::{Mechanics, MechanicsLaw, MechanicsSpec};
-pub use mesh::{BarSpec, BrickSpec, Built, MeshSpec, SubstrateSpec, TubeSpec};
+pub use mesh::{BarSpec, BrickSpec, MeshSpec, SubstrateSpec, TubeSpec};
 pub use part::{BoundarySpec, PartOutput, PartScene, PrintSpec, ProbeSpec, RegionSpec, SourceSpec, TimeSpec};
 pub(crate) use places::millimetres;
 pub use point::{CompareSpec, ExchangeSpec, LegSpec, NodesSpec, PointScene, PointSpec};
 pub use problem::Task;
 pub use schedule::{ScheduleSpec, TimesSpec};
 pub use study::StudySpec;
-pub use voxels::{Filling, PathSpec, StlSpec};
+pub use voxels::{BuiltMesh, Filling, PathSpec, StlSpec};
 
 pub(crate) use harness::scene::check_name;
 

@@ -5,44 +5,32 @@ use super::file;
 use super::part::PrintSpec;
 use super::places::{elements, millimetres};
 use super::voxels::Filling;
-use crate::element;
+use crate::boundary::Schedule;
 use crate::error::Error;
 use crate::mesh::Mesh;
 use crate::mesh::RATIOS;
-use crate::mesh::layers::{Layers, groups};
-use crate::mesh::path::{Bead, Setting, ToolPath, read_csv, read_gcode};
-use crate::problem::Birth;
+use crate::mesh::layers::Layers;
+use crate::mesh::path::{Bead, ToolPath, read_csv, read_gcode};
+use crate::print_plan::{NOZZLE, PrintPlan};
 use harness::scene::{SceneError, Source};
-use std::collections::BTreeMap;
 use std::path::Path;
-
-/// Elements and times of births.
-#[derive(Default)]
-pub(super) struct Laid {
-    pub births: Vec<Birth>,
-    /// Elements that are never printed, ascending.
-    pub absent: Vec<u32>,
-    pub layers: Vec<Vec<u32>>,
-    /// End of the path, s.
-    pub end: f64,
-}
 
 impl PrintSpec {
     /// `filling`: of a mesh of a path, which is printed along it unless layers are asked for.
-    pub(super) fn laid(
+    pub(super) fn plan(
         &self,
         source: &Source,
         mesh: &Mesh,
         filling: Option<&Filling>,
         notes: &mut Vec<String>,
-    ) -> Result<Laid, SceneError> {
+    ) -> Result<PrintPlan, SceneError> {
         if let Some(file) = &self.path {
-            return self.along(source, mesh, file, notes);
+            return self.plan_along_file(source, mesh, file, notes);
         }
         if let (Some((tool, times)), None) =
             (filling.and_then(|filling| filling.path.as_ref()), self.layer_time)
         {
-            return self.timed(source, tool, times, Vec::new());
+            return self.plan_along(source, tool, times);
         }
         let at = |key: &str, error: Error| located(source, key, &error);
         let layers = match (&self.elements, self.layer_height) {
@@ -55,82 +43,40 @@ impl PrintSpec {
                 .map_err(|error| at("print.layers", error))?,
         };
         notes.extend(layers.notes);
-        let start = self.start.map_or(0.0, |start| start.si());
         let interval = self.layer_time.map_or(0.0, |time| time.si());
-        let groups = (0..).zip(&layers.elements);
-        let groups = groups.map(|(layer, elements)| (start + f64::from(layer) * interval, elements.clone()));
-        let births = self.births(source, None, &[], groups.collect())?;
-        let end = start + births.len() as f64 * interval;
-        Ok(Laid { births, layers: layers.elements, end, absent: Vec::new() })
+        let schedule = self.schedule(source)?;
+        let temperature = |time| schedule.as_ref().map_or(f64::NAN, |schedule| schedule.at(time));
+        Ok(PrintPlan::in_layers(layers.elements, self.start(), interval, temperature))
     }
 
-    /// `tool`, `times`: the path whose nozzle gives the temperature where the scene does not, and the time of each element on it.
-    fn births(
-        &self,
-        source: &Source,
-        tool: Option<&ToolPath>,
-        times: &[f64],
-        groups: Vec<(f64, Vec<u32>)>,
-    ) -> Result<Vec<Birth>, SceneError> {
-        let start = self.start.map_or(0.0, |start| start.si());
-        let schedule = match &self.temperature {
-            Some(given) => Some(given.build(source, "print.temperature")?),
-            None => None,
-        };
-        let nozzle = tool.map_or_else(Vec::new, |tool| tool.setting(Setting::Nozzle));
-        let mut births = Vec::with_capacity(groups.len());
-        for (time, elements) in groups {
-            if let Some(schedule) = &schedule {
-                births.push(Birth { time, elements, temperature: schedule.at(time) });
-                continue;
-            }
-            // each as it is laid down, not when all appear: tools differ
-            let mut by_temperature: BTreeMap<u64, Vec<u32>> = BTreeMap::new();
-            for element in elements {
-                let laid = times.get(element as usize).copied().unwrap_or(time - start);
-                let before = nozzle.partition_point(|(from, _)| *from <= laid);
-                let Some(set) = before.checked_sub(1).map(|at| nozzle[at].1) else {
-                    let found = format!("nothing, and no M104 or M109 in the file before {time} s");
-                    return Err(source.error("print.temperature", found, "a temperature"));
-                };
-                by_temperature.entry(set.to_bits()).or_default().push(element);
-            }
-            let births_of = by_temperature.into_iter();
-            births.extend(births_of.map(|(bits, elements)| Birth {
-                time,
-                elements,
-                temperature: f64::from_bits(bits),
-            }));
-        }
-        Ok(births)
+    fn start(&self) -> f64 {
+        self.start.map_or(0.0, |start| start.si())
+    }
+
+    fn schedule(&self, source: &Source) -> Result<Option<Schedule>, SceneError> {
+        self.temperature.as_ref().map(|given| given.build(source, "print.temperature")).transpose()
     }
 
     /// Elements at their times along a path.
-    fn timed(
-        &self,
-        source: &Source,
-        tool: &ToolPath,
-        times: &[f64],
-        absent: Vec<u32>,
-    ) -> Result<Laid, SceneError> {
-        let start = self.start.map_or(0.0, |start| start.si());
-        let window = self.window.map_or(0.01 * tool.duration(), |window| window.si());
-        let groups = groups(times, window).map_err(|error| located(source, "print.window", &error))?;
-        let groups = groups.into_iter().map(|(time, list)| (start + time, list)).collect();
-        let births = self.births(source, Some(tool), times, groups)?;
-        let last = births.last().map_or(start, |birth| birth.time);
-        let end = (start + tool.duration()).max(last + window);
-        Ok(Laid { births, absent, layers: Vec::new(), end })
+    fn plan_along(&self, source: &Source, path: &ToolPath, times: &[f64]) -> Result<PrintPlan, SceneError> {
+        let (window, schedule) = (self.window.map(|window| window.si()), self.schedule(source)?);
+        PrintPlan::along(path, times, self.start(), window, schedule.as_ref()).map_err(|error| match error {
+            Error::Parameter { name: NOZZLE, found: time, .. } => {
+                let found = format!("nothing, and no M104 or M109 in the file before {time} s");
+                source.error("print.temperature", found, "a temperature")
+            }
+            other => located(source, "print.window", &other),
+        })
     }
 
     /// Along a path; what its beads do not cover is never printed.
-    fn along(
+    fn plan_along_file(
         &self,
         source: &Source,
         mesh: &Mesh,
         file: &Path,
         notes: &mut Vec<String>,
-    ) -> Result<Laid, SceneError> {
+    ) -> Result<PrintPlan, SceneError> {
         let at = |key: &str, error: Error| located(source, key, &error);
         let path = source.file(file);
         let table = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv"));
@@ -142,7 +88,7 @@ impl PrintSpec {
             tool = file::timed(source, "print", tool, self.acceleration, self.jerk, notes)?;
         }
         if tool.is_fed() {
-            notes.extend(tool.told(fed));
+            notes.extend(tool.summary(fed));
         }
         file::leave_out(source, "print", &self.leave_out, &mut tool, notes)?;
         let elements = elements(source, mesh, "print.elements", self.elements.as_deref())?;
@@ -158,7 +104,7 @@ impl PrintSpec {
         }
         let mut activation =
             tool.activation(mesh, &elements, bead).map_err(|error| at("print.path", error))?;
-        let volume = |list: &[u32]| list.iter().map(|&element| element::volume(mesh, element)).sum::<f64>();
+        let volume = |list: &[u32]| list.iter().map(|&element| mesh.volume(element)).sum::<f64>();
         let whole = volume(&elements);
         let share = |list: &[u32]| 100.0 * (1.0 - volume(list) / whole);
         let covered = share(&activation.missed);
@@ -197,6 +143,7 @@ impl PrintSpec {
                 ));
             }
         }
-        self.timed(source, &tool, &activation.times, activation.missed)
+        let plan = self.plan_along(source, &tool, &activation.times)?;
+        Ok(PrintPlan { absent: activation.missed, ..plan })
     }
 }

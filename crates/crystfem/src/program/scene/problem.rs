@@ -1,24 +1,22 @@
 //! From a scene to a problem of heat conduction.
 
 use super::fault::{located, located_in};
-use super::healing::Interfaces;
 use super::mechanics::Mechanics;
 use super::memory;
-use super::mesh::Built;
 use super::part::{BoundarySpec, PartScene};
 use super::places::{elements, millimetres};
-use super::print::Laid;
-use super::voxels::Filling;
+use super::voxels::{BuiltMesh, Filling};
 use crate::boundary::{Condition, Field, Schedule, Source as Heat, Where};
-use crate::error::Error;
-use crate::material::{Filled, ThermalMaterial};
+use crate::coupling::HealingSettings;
+use crate::material::{ThermalMaterial, fill_elements};
 use crate::mesh::surface::Surface;
 use crate::mesh::{Face, Mesh, Place};
-use crate::problem::Problem;
+use crate::print_plan::PrintPlan;
+use crate::problem::{Problem, initial_temperatures};
 use crate::simulation::Settings;
 use crate::time::Steps;
 use harness::scene::{LineSpec, SceneError, Source};
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 use std::sync::Arc;
 
 /// Temporal error in a step, K, and rms error of solves, K, unless a scene says otherwise.
@@ -60,38 +58,9 @@ pub struct Task {
     /// Stress, where the scene asks for it.
     pub mechanics: Option<Mechanics>,
     /// Interfaces that heal, where the scene asks for it.
-    pub interfaces: Option<Interfaces>,
+    pub interfaces: Option<HealingSettings>,
     /// What should be looked at.
     pub notes: Vec<String>,
-}
-
-/// Materials by material and filled part, as far as elements have them.
-fn fill(
-    materials: &mut Vec<Arc<dyn ThermalMaterial>>,
-    material_of: &mut [u16],
-    parts: &[f64],
-    part_of: &[usize],
-) -> Result<(), Error> {
-    let mut all: Vec<Arc<dyn ThermalMaterial>> = Vec::new();
-    let mut known: HashMap<(u16, usize), u16> = HashMap::new();
-    for (material, &part) in material_of.iter_mut().zip(part_of) {
-        let key = (*material, part);
-        *material = match known.get(&key) {
-            Some(&found) => found,
-            None => {
-                let number = u16::try_from(all.len()).map_err(|_| Error::Parameter {
-                    name: "filled parts of all materials",
-                    found: all.len() as f64,
-                    allowed: "at most 65536".into(),
-                })?;
-                all.push(Arc::new(Filled::new(materials[usize::from(key.0)].clone(), parts[part])?));
-                known.insert(key, number);
-                number
-            }
-        };
-    }
-    *materials = all;
-    Ok(())
 }
 
 impl PartScene {
@@ -100,8 +69,8 @@ impl PartScene {
     /// # Errors
     /// A [`SceneError`] for sets and surfaces that the mesh lacks, elements without a material, and for what
     /// [`Problem::check`] refuses.
-    pub fn task(&self, source: &Source, built: Built) -> Result<Task, SceneError> {
-        let Built { mesh, filling, .. } = built;
+    pub fn task(&self, source: &Source, built: BuiltMesh) -> Result<Task, SceneError> {
+        let BuiltMesh { mesh, filling, .. } = built;
         let mut notes = Vec::new();
         let probes = self.places(source, &mesh, &mut notes)?;
         let (mut materials, mut material_of, temperature_of) = self.regions(source, &mesh)?;
@@ -117,19 +86,18 @@ impl PartScene {
             let power = Field::Uniform(spec.power.build(source, &format!("source[{index}].power"))?);
             heats.push(Heat { elements, power });
         }
-        let Laid { births, absent, layers, end: by_itself } = match &self.print {
-            Some(print) => print.laid(source, &mesh, filling.as_ref(), &mut notes).map_err(|fault| {
+        let PrintPlan { births, absent, layers, end: by_itself } = match &self.print {
+            Some(print) => print.plan(source, &mesh, filling.as_ref(), &mut notes).map_err(|fault| {
                 // a file in millimetres that is read in metres has few layers, or lies far away
                 self.mesh.without_unit(source, &mesh).unwrap_or(fault)
             })?,
-            None => Laid::default(),
+            None => PrintPlan::default(),
         };
         let mechanics = {
             let path = filling.as_ref().and_then(|filling| filling.path.as_ref()).map(|(path, _)| path);
             self.mechanics(source, &mesh, &material_of, &absent, path)?
         };
-        let appearing = births.iter().map(|birth| birth.elements.as_slice());
-        let interfaces = self.interfaces(source, &mesh, &material_of, appearing)?;
+        let interfaces = self.interfaces(source, &mesh, &material_of, &births)?;
         let end = self.time.end.map_or(by_itself, |end| end.si());
         memory::refuse_times(source, self, end)?;
         self.note_hot_bed(source, end, &mut notes)?;
@@ -150,10 +118,10 @@ impl PartScene {
         }
         let later = births.iter().flat_map(|birth| &birth.elements).chain(&absent).copied();
         let later: HashSet<u32> = later.collect();
-        let initial = initial(&mesh, &temperature_of, &later);
+        let initial = initial_temperatures(&mesh, &temperature_of, &later);
         let capacity = self.time.capacity;
         if let Some((parts, part_of)) = filling.as_ref().and_then(|filling| filling.parts.as_ref()) {
-            fill(&mut materials, &mut material_of, parts, part_of)
+            fill_elements(&mut materials, &mut material_of, parts, part_of)
                 .map_err(|error| located(source, "mesh", &error))?;
         }
         let problem = Problem {
@@ -431,24 +399,4 @@ impl BoundarySpec {
         }
         Ok(conditions)
     }
-}
-
-/// Temperatures at nodes: that of the last element there that is not laid down later; a node that two regions share takes
-/// that of the later one.
-fn initial(mesh: &Mesh, temperature_of: &[f64], later: &HashSet<u32>) -> Field {
-    let first = temperature_of.first().copied().unwrap_or(0.0);
-    if temperature_of.iter().all(|&temperature| temperature == first) {
-        return Field::constant(first);
-    }
-    // by place, as the problem asks; places of nodes are exact
-    let mut at = HashMap::new();
-    for (element, &temperature) in temperature_of.iter().enumerate() {
-        if later.contains(&(element as u32)) {
-            continue;
-        }
-        for &node in mesh.nodes(element as u32) {
-            at.insert(mesh.points[node as usize].map(f64::to_bits), temperature);
-        }
-    }
-    Field::function(move |place, _| at.get(&place.map(f64::to_bits)).copied().unwrap_or(first))
 }

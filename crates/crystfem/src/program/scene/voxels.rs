@@ -3,10 +3,9 @@
 use super::fault::{located, located_in};
 use super::file;
 use super::memory;
-use super::mesh::Built;
 use crate::error::Error;
 use crate::mesh::path::{Cells, Deposit, ToolPath, read_gcode};
-use crate::mesh::{RATIOS, Voxels, quality, stl};
+use crate::mesh::{Mesh, RATIOS, Voxels, quality, stl};
 use harness::scene::{SceneError, Source};
 use polycore::units::{Acceleration, Length, Speed};
 use serde::Deserialize;
@@ -96,8 +95,20 @@ pub struct Filling {
     pub path: Option<(ToolPath, Vec<f64>)>,
 }
 
+/// A mesh, and what should be looked at.
+pub struct BuiltMesh {
+    /// The mesh.
+    pub mesh: Mesh,
+    /// Notes for the user.
+    pub notes: Vec<String>,
+    /// Volume of all elements, m³.
+    pub volume: f64,
+    /// How full the elements of a path or an STL surface are.
+    pub filling: Option<Filling>,
+}
+
 impl PathSpec {
-    pub(super) fn build(&self, source: &Source) -> Result<Built, SceneError> {
+    pub(super) fn build(&self, source: &Source) -> Result<BuiltMesh, SceneError> {
         let block = "mesh.path";
         let at = |error: Error| located_in(source, block, &KEYS, &error);
         let file = source.file(&self.file);
@@ -105,7 +116,7 @@ impl PathSpec {
         let mut notes = std::mem::take(&mut path.notes);
         let filament = file::filament(source, block, &path, self.filament)?;
         path = file::timed(source, block, path, self.acceleration, self.jerk, &mut notes)?;
-        notes.extend(path.told(filament));
+        notes.extend(path.summary(filament));
         path = file::purged(source, "mesh.path.file", path, &mut notes)?;
         let height = self.bead_height.map(|x| x.si());
         if height.is_none_or(|height| height > 0.0) && filament > 0.0 {
@@ -127,12 +138,12 @@ impl PathSpec {
                 sets.join(", ")
             ));
         }
-        built(source, block, voxels, self.fill, notes, Some((path, times)))
+        finish(source, block, voxels, self.fill, notes, Some((path, times)))
     }
 }
 
 impl StlSpec {
-    pub(super) fn build(&self, source: &Source) -> Result<Built, SceneError> {
+    pub(super) fn build(&self, source: &Source) -> Result<BuiltMesh, SceneError> {
         let block = "mesh.stl";
         let at = |error: Error| located_in(source, block, &KEYS, &error);
         let file = source.file(&self.file);
@@ -145,7 +156,7 @@ impl StlSpec {
         let (voxels, overlaps) = surface.voxels(size, least).map_err(at)?;
         surface.notes.extend(overlaps);
         surface.notes.push(format!("the part is {}", box_of(surface.bounds())));
-        built(source, block, voxels, self.fill, surface.notes, None)
+        finish(source, block, voxels, self.fill, surface.notes, None)
     }
 
     /// Refuses a part that is too small or too large to be printed, or smaller than a cell: its unit is another.
@@ -185,14 +196,15 @@ fn rounded(x: f64) -> f64 {
     format!("{x:.4e}").parse().unwrap_or(x)
 }
 
-fn built(
+/// Checks cells and notes what should be looked at.
+fn finish(
     source: &Source,
     block: &str,
     voxels: Voxels,
     fill: bool,
     mut notes: Vec<String>,
     path: Option<(ToolPath, Vec<f64>)>,
-) -> Result<Built, SceneError> {
+) -> Result<BuiltMesh, SceneError> {
     let cubic = 1e9 * voxels.volume;
     let told = format!("cells have {:.4} times the volume of the body, {cubic:.3} mm³", voxels.ratio);
     if !fill && !voxels.may_be_full() {
@@ -215,5 +227,5 @@ fn built(
     let found = quality::check(&voxels.mesh, None).map_err(|error| located(source, block, &error))?;
     notes.extend(found.notes);
     let filling = Filling { parts, volume: voxels.volume, ratio: voxels.ratio, path };
-    Ok(Built { mesh: voxels.mesh, notes, volume: found.volume, filling: Some(filling) })
+    Ok(BuiltMesh { mesh: voxels.mesh, notes, volume: found.volume, filling: Some(filling) })
 }

@@ -27,8 +27,7 @@ impl Axis {
         let (low, high) = match range {
             Some((low, high)) => (scale(low), scale(high)),
             None => {
-                let ends = |(low, high): (f64, f64), value: f64| (low.min(value), high.max(value));
-                let (low, high) = values.map(scale).fold((f64::INFINITY, f64::NEG_INFINITY), ends);
+                let [low, high] = polycore::numerics::range(values.map(scale));
                 let span = high - low;
                 let least = if log { 0.1 } else { 1e-6 * low.abs().max(high.abs()).max(f64::MIN_POSITIVE) };
                 let padding = if span > least { PADDING * span } else { 10.0 * least };

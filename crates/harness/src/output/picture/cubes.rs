@@ -1,8 +1,9 @@
 //! The surface of a body of particles: deformed cells of a lattice, or a cube for each particle of a cloud.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 
 use super::skin::{Corner, Plane, Skin};
+use crate::output::lattice::{Cells, NONE, joined, neighbours};
 
 /// Particles in space.
 #[derive(Clone, Copy, Debug)]
@@ -18,12 +19,6 @@ pub struct Particles<'a> {
     pub bridge: f64,
 }
 
-/// Of two neighbours of a lattice there is a crack between those that have moved apart this many times farther than both
-/// have from the next ones behind them.
-const JUMP: f64 = 2.0;
-/// How far from its place in the lattice, in spacings, a particle may be.
-const OFF: f64 = 0.05;
-const NONE: u32 = u32::MAX;
 /// Neighbours at both ends of x, y and z.
 const STEPS: [[i64; 3]; 6] = [[-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]];
 
@@ -35,8 +30,10 @@ impl Particles<'_> {
         let mut skin = Skin::new(None);
         let count = self.reference.len().min(self.positions.len());
         let gone = |k: usize| cut.is_some_and(|plane| plane.side(self.reference[k]) > 0.0);
-        let next = self.neighbours(count);
-        let lattice = Lattice { particles: self, next: &next };
+        let next = neighbours(&self.reference[..count], self.spacing);
+        let positions = &self.positions[..count];
+        let joined = joined(positions, &next, self.spacing, self.bridge);
+        let cells = Cells { positions, joined: &joined, spacing: self.spacing, axes: 3 };
         let loose = |k: usize| next[k] == [NONE; 6];
         let taken: HashSet<[i64; 3]> =
             (0..count).filter(|&k| loose(k) && !gone(k)).map(|k| self.cell(self.positions[k])).collect();
@@ -51,18 +48,18 @@ impl Particles<'_> {
                 continue;
             }
             for side in 0..6 {
-                let beyond = lattice.joined(particle, side);
-                if beyond.is_some_and(|other| !gone(other)) {
+                let beyond = joined[particle][side];
+                if beyond != NONE && !gone(beyond as usize) {
                     continue;
                 }
                 let (axis, [u, v]) = (side / 2, [(side / 2 + 1) % 3, (side / 2 + 2) % 3]);
                 let corners = [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[a, b]| {
-                    let mut sides = [0; 3];
-                    (sides[axis], sides[u], sides[v]) = (side, 2 * u + a, 2 * v + b);
+                    let corner = (side % 2) << axis | a << u | b << v;
                     let at = if loose(particle) {
-                        [0, 1, 2].map(|d| at[d] + self.spacing * (sides[d] % 2) as f64 - 0.5 * self.spacing)
+                        [0, 1, 2]
+                            .map(|d| at[d] + self.spacing * (corner >> d & 1) as f64 - 0.5 * self.spacing)
                     } else {
-                        lattice.corner(particle, sides)
+                        cells.corner(particle, corner as u8)
                     };
                     Corner { at, values }
                 });
@@ -75,116 +72,6 @@ impl Particles<'_> {
     /// The cell of a cubic grid.
     fn cell(&self, x: [f64; 3]) -> [i64; 3] {
         x.map(|x| (x / self.spacing).floor() as i64)
-    }
-
-    /// Of the given reference neighbours, those without a crack in between; the others become `u32::MAX`.
-    pub(crate) fn joins(&self, next: &[[u32; 6]]) -> Vec<[u32; 6]> {
-        let lattice = Lattice { particles: self, next };
-        let of =
-            |side: usize, particle: usize| lattice.joined(particle, side).map_or(NONE, |other| other as u32);
-        (0..next.len()).map(|particle| [0, 1, 2, 3, 4, 5].map(|side| of(side, particle))).collect()
-    }
-
-    /// Reference neighbours at both ends of x, y and z, `u32::MAX` where there is none.
-    pub(crate) fn neighbours(&self, count: usize) -> Vec<[u32; 6]> {
-        let Some(origin) = self.reference.first() else { return Vec::new() };
-        let place = |x: &[f64; 3]| -> Option<[i64; 3]> {
-            let steps = [0, 1, 2].map(|d| (x[d] - origin[d]) / self.spacing);
-            let near = steps.iter().all(|x| (x - x.round()).abs() < OFF);
-            near.then(|| steps.map(|x| x.round() as i64))
-        };
-        let mut index: HashMap<[i64; 3], u32> = HashMap::with_capacity(count);
-        for (k, x) in self.reference[..count].iter().enumerate() {
-            if let Some(place) = place(x) {
-                index.entry(place).or_insert(k as u32);
-            }
-        }
-        let of = |(k, x): (usize, &[f64; 3])| {
-            let place = place(x).filter(|place| index.get(place) == Some(&(k as u32)));
-            place.map_or([NONE; 6], |place| {
-                STEPS.map(|step| {
-                    let there = [0, 1, 2].map(|d| place[d].saturating_add(step[d]));
-                    index.get(&there).copied().unwrap_or(NONE)
-                })
-            })
-        };
-        self.reference[..count].iter().enumerate().map(of).collect()
-    }
-}
-
-struct Lattice<'a> {
-    particles: &'a Particles<'a>,
-    next: &'a [[u32; 6]],
-}
-
-impl Lattice<'_> {
-    fn beside(&self, particle: usize, side: usize) -> Option<usize> {
-        let other = self.next[particle][side];
-        (other != NONE).then_some(other as usize)
-    }
-
-    fn between(&self, from: usize, to: usize) -> [f64; 3] {
-        [0, 1, 2].map(|d| self.particles.positions[to][d] - self.particles.positions[from][d])
-    }
-
-    /// The neighbour at a side, unless a crack is between.
-    fn joined(&self, particle: usize, side: usize) -> Option<usize> {
-        let other = self.beside(particle, side)?;
-        let Particles { spacing, bridge, .. } = *self.particles;
-        let farthest = spacing * bridge.max(1.0) * (1.0 + 1e-9);
-        let gap = |a: usize, b: usize| self.between(a, b).iter().map(|x| x * x).sum::<f64>().sqrt();
-        let behind = |particle: usize, side: usize| {
-            self.beside(particle, side).map(|next| gap(particle, next)).filter(|&gap| gap <= farthest)
-        };
-        let most = match (behind(particle, side ^ 1), behind(other, side)) {
-            (None, None) => farthest,
-            (a, b) => (JUMP * a.unwrap_or(0.0).max(b.unwrap_or(0.0)).max(spacing)).min(farthest),
-        };
-        (gap(particle, other) <= most).then_some(other)
-    }
-
-    /// From a particle to the middle of its cell's side.
-    fn half(&self, particle: usize, side: usize) -> [f64; 3] {
-        if let Some(other) = self.joined(particle, side) {
-            return self.between(particle, other).map(|x| 0.5 * x);
-        }
-        if let Some(other) = self.joined(particle, side ^ 1) {
-            return self.between(particle, other).map(|x| -0.5 * x);
-        }
-        STEPS[side].map(|step| 0.5 * self.particles.spacing * step as f64)
-    }
-
-    /// The corner of three sides of a cell: the mean over the connected cells around it, so that they share the corner.
-    fn corner(&self, particle: usize, sides: [usize; 3]) -> [f64; 3] {
-        // bit d of a place: other side of the corner along axis d
-        let mut around = [None; 8];
-        around[0] = Some(particle);
-        let mut open = vec![(0, particle)];
-        let toward = |place: usize, d: usize| sides[d] ^ (place >> d & 1);
-        while let Some((place, here)) = open.pop() {
-            for d in 0..3 {
-                let there = place ^ (1 << d);
-                if around[there].is_none()
-                    && let Some(other) = self.joined(here, toward(place, d))
-                {
-                    around[there] = Some(other);
-                    open.push((there, other));
-                }
-            }
-        }
-        let mut members: Vec<(usize, usize)> =
-            around.iter().enumerate().filter_map(|(place, member)| Some(((*member)?, place))).collect();
-        // one order for all cells of the corner: the same bits
-        members.sort_unstable();
-        let mut sum = [0.0; 3];
-        for &(member, place) in &members {
-            let halves = [0, 1, 2].map(|d| self.half(member, toward(place, d)));
-            for d in 0..3 {
-                sum[d] +=
-                    self.particles.positions[member][d] + halves.iter().map(|half| half[d]).sum::<f64>();
-            }
-        }
-        sum.map(|x| x / members.len() as f64)
     }
 }
 

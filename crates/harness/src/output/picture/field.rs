@@ -1,5 +1,6 @@
 //! Fields on particles in the plane, as coloured blocks with a colour bar.
 
+use polycore::numerics::range;
 use std::io::Write;
 use std::path::Path;
 use std::sync::Arc;
@@ -121,8 +122,7 @@ impl<'a> Panel<'a> {
             return range;
         }
         let finite = self.values.iter().copied().filter(|value| value.is_finite());
-        let (low, high) =
-            finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+        let [low, high] = range(finite);
         let (low, high) = match self.colors {
             _ if low > high => (0.0, 1.0),
             ColorMap::Diverging => (-low.abs().max(high.abs()), low.abs().max(high.abs())),

@@ -1,6 +1,7 @@
 //! From particles to whole pixels.
 
 use super::blocks::{Block, Blocks};
+use polycore::numerics::{bounds, range};
 
 /// The part of the plane that is drawn, and its resolution.
 #[derive(Clone, Copy, Debug)]
@@ -27,17 +28,11 @@ const SLACK: f64 = 1.5;
 impl Window {
     /// Around all particles, about `size` pixels in its longer direction; none if a position is not finite.
     pub(super) fn around(positions: &[[f64; 2]], spacing: f64, size: f64) -> Option<Self> {
-        let mut low = [f64::INFINITY; 2];
-        let mut high = [f64::NEG_INFINITY; 2];
-        for position in positions {
-            for axis in 0..2 {
-                if !position[axis].is_finite() {
-                    return None;
-                }
-                low[axis] = low[axis].min(position[axis] - spacing / 2.0);
-                high[axis] = high[axis].max(position[axis] + spacing / 2.0);
-            }
+        if !positions.iter().flatten().all(|x| x.is_finite()) {
+            return None;
         }
+        let [low, high] = bounds(positions.iter().copied());
+        let (low, high) = (low.map(|x| x - spacing / 2.0), high.map(|x| x + spacing / 2.0));
         let extent = (high[0] - low[0]).max(high[1] - low[1]) / spacing;
         let up = (size / extent).ceil();
         let pixels = if up * extent <= SLACK * size {
@@ -93,8 +88,7 @@ impl Window {
         let corners = corners.map(place);
         let ends = |axis: usize, limit: usize| {
             let along = corners.map(|corner| corner[axis]);
-            let (low, high) =
-                along.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &x| (l.min(x), h.max(x)));
+            let [low, high] = range(along);
             pixel(low, limit)..=pixel(high, limit)
         };
         for row in ends(1, height) {

@@ -32,12 +32,8 @@ pub fn measure(spec: &CrystalSpec, output: &Path, report: &mut Report) -> Result
     value(q::MONOMERS.into(), nitrogens as f64);
     let bonds = cell.bonds();
     value(q::BONDS.into(), bonds.len() as f64);
-    value(q::CHAINS.into(), chains(&cell) as f64);
-    let mut of_atom = vec![Vec::new(); cell.atoms.len()];
-    for (i, j, d) in &bonds {
-        of_atom[*i].push(*d);
-        of_atom[*j].push(-d);
-    }
+    value(q::CHAINS.into(), cell.molecules() as f64);
+    let of_atom = cell.bonds_of_atoms();
     for element in Element::ALL {
         for count in 1..=4 {
             let with =
@@ -48,26 +44,9 @@ pub fn measure(spec: &CrystalSpec, output: &Path, report: &mut Report) -> Result
             }
         }
     }
-    let mut carbon = [f64::INFINITY, f64::NEG_INFINITY];
-    for (_, own) in cell.atoms.iter().zip(&of_atom).filter(|((e, _), own)| *e == Element::C && own.len() == 4)
-    {
-        for (index, a) in own.iter().enumerate() {
-            for b in &own[..index] {
-                let angle = a.angle(b).to_degrees();
-                carbon = [carbon[0].min(angle), carbon[1].max(angle)];
-            }
-        }
-    }
+    let carbon = cell.angles(Element::C, 4).map(f64::to_degrees);
     value(q::LEAST_ANGLE.into(), carbon[0]);
     value(q::GREATEST_ANGLE.into(), carbon[1]);
-    let atoms = &cell.atoms;
-    let lengths = |first: Element, second: Element| {
-        let own = bonds.iter().filter(move |(i, j, _)| {
-            let pair = [atoms[*i].0, atoms[*j].0];
-            pair == [first, second] || pair == [second, first]
-        });
-        own.map(|(_, _, d)| d.norm()).collect::<Vec<f64>>()
-    };
     for (first, second) in [
         (Element::C, Element::C),
         (Element::C, Element::H),
@@ -75,10 +54,10 @@ pub fn measure(spec: &CrystalSpec, output: &Path, report: &mut Report) -> Result
         (Element::C, Element::N),
         (Element::N, Element::H),
     ] {
-        let all = lengths(first, second);
         let pair = format!("{first:?}{second:?}");
-        value(q::SHORTEST_BOND.of(&[&pair]), all.iter().copied().fold(f64::INFINITY, f64::min));
-        value(q::LONGEST_BOND.of(&[&pair]), all.iter().copied().fold(0.0, f64::max));
+        let [shortest, longest] = cell.bond_lengths(first, second);
+        value(q::SHORTEST_BOND.of(&[&pair]), shortest);
+        value(q::LONGEST_BOND.of(&[&pair]), longest);
     }
     for (index, torsion) in amide_torsions(LATTICE.b / 2.0)?.into_iter().enumerate() {
         value(q::TORSION.of(&[&(index + 1).to_string()]), torsion.abs());
@@ -122,16 +101,4 @@ pub fn measure(spec: &CrystalSpec, output: &Path, report: &mut Report) -> Result
         }
     }
     Ok(())
-}
-
-/// Molecules of a periodic cell, by its bonds.
-fn chains(cell: &Crystal) -> usize {
-    let mut of: Vec<usize> = (0..cell.atoms.len()).collect();
-    for (i, j, _) in cell.bonds() {
-        let (from, to) = (of[i], of[j]);
-        of.iter_mut().filter(|own| **own == from).for_each(|own| *own = to);
-    }
-    of.sort_unstable();
-    of.dedup();
-    of.len()
 }

@@ -1,5 +1,6 @@
 //! What searches have found at what cost: the best loss against epochs and seconds, by method.
 
+use crate::dataset::statistics::median;
 use crate::program::quantities as q;
 use crate::program::scene::SearchSpec;
 use crate::search::{Journal, Method};
@@ -33,16 +34,6 @@ fn course(one: &Searched, method: Method) -> Vec<[f64; 3]> {
         points.push([epochs, seconds, best]);
     }
     points
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    match values.len() {
-        0 => f64::NAN,
-        n if n % 2 == 1 => values[middle],
-        _ => 0.5 * (values[middle - 1] + values[middle]),
-    }
 }
 
 /// Curves `error_against_time_METHOD` with medians over the seeds, and what was found in the end.

@@ -15,11 +15,6 @@ use polycore::tensor::Voigt;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// A best epoch within this part of all is among the first …
-const EARLY: f64 = 0.1;
-/// … of a training with at least so many epochs.
-const LONG: usize = 20;
-
 /// Where the trainings of a scene stand: member by member of model by model; the last may be unfinished.
 #[derive(Debug, Default, Serialize, Deserialize)]
 struct Progress {
@@ -231,18 +226,13 @@ pub fn remarks(trained: &[Trained], data: &Prepared) -> Vec<String> {
     trained.iter().filter_map(remark).chain(trained.iter().flat_map(early)).collect()
 }
 
-/// Whether an epoch is among the first of a training that is long enough to tell.
-fn is_early(best: usize, epochs: usize) -> bool {
-    epochs >= LONG && best as f64 <= EARLY * epochs as f64
-}
-
 /// Members whose best epoch is among the first: they have not learnt from the rest of their training.
 fn early(model: &Trained) -> Vec<String> {
     let members = model.states.len();
     let line = |(member, state): (usize, &State)| {
         let (best, epochs) = (state.best_epoch() as usize, state.history().len());
         let of = if members > 1 { format!(" (member {} of {members})", member + 1) } else { String::new() };
-        is_early(best, epochs).then(|| {
+        state.is_best_early().then(|| {
             format!(
                 "{}{of}: its best epoch is {best} of {epochs}: the loss on the validation rows only grew afterwards, so the law is \
                  that of the first steps. Look at its learning curve; a smaller learning rate, or validation rows more like the \
@@ -278,16 +268,4 @@ pub fn record(trained: &[Trained], output: &Path, report: &mut Report) -> Result
     }
     let curves: Vec<_> = trained.iter().map(|model| (model.name.as_str(), &model.states[0])).collect();
     super::draw::learning(&curves, output)
-}
-
-#[cfg(test)]
-mod tests {
-    #[test]
-    fn epochs_among_the_first() {
-        for (best, epochs, early) in
-            [(1, 20, true), (3, 20, false), (100, 1000, true), (101, 1000, false), (1, 5, false)]
-        {
-            assert_eq!(super::is_early(best, epochs), early, "{best} of {epochs}");
-        }
-    }
 }

@@ -5,8 +5,8 @@ use super::{Failure, Prepared, short};
 use crate::error::Error;
 use crate::program::quantities as q;
 use crate::program::scene::{ModelSpec, Scene, TrialSpec};
-use crate::surrogate::{Surrogate, Workspace};
-use crate::train::{Settings, Training, ensemble};
+use crate::surrogate::Workspace;
+use crate::train::{State, fit};
 use harness::case::Run;
 use harness::report::{Report, Trial};
 use harness::scene::Source;
@@ -66,7 +66,12 @@ fn observed(
         |model: &&ModelSpec| trial.models.as_ref().is_none_or(|names| names.contains(&model.title()));
     for model in scene.model.iter().filter(chosen) {
         let settings = model.training.over(&scene.training, quick);
-        let (law, best) = trained(model, settings, &data, epochs)?;
+        let (rows, validation) = (data.rows(&data.split.train), data.rows(&data.split.validation));
+        let (kind, shape) = (model.law(), model.architecture());
+        let header = crate::fitted::header(kind, shape, model.members, &rows, model.standardised())?;
+        let (law, states) = fit(header, &rows, &validation, settings)?;
+        *epochs += states.iter().map(|state| state.history().len() as u64).sum::<u64>();
+        let best = states.iter().map(State::best_loss).fold(0.0, f64::max);
         let mut part = format!("{}: loss {} MPa²", model.title(), short(best));
         if let Some(c) = trial.at {
             let answer = law.stress(&Voigt::from(c), &mut Workspace::default()).map_err(Error::from)?;
@@ -81,30 +86,4 @@ fn observed(
         parts.push(format!("{} rows read", data.set.len()));
     }
     Ok((parts.join("; "), flagged))
-}
-
-/// A law, and the loss of its best epoch.
-fn trained(
-    model: &ModelSpec,
-    settings: Settings,
-    data: &Prepared,
-    epochs: &mut u64,
-) -> Result<(Surrogate, f64), Failure> {
-    let (rows, validation) = (data.rows(&data.split.train), data.rows(&data.split.validation));
-    let header =
-        crate::fitted::header(model.law(), model.architecture(), model.members, &rows, model.standardised())?;
-    let (mut learnt, mut worst) = (Vec::new(), 0.0f64);
-    for member in 0..model.members {
-        let settings = Settings { seed: settings.seed.wrapping_add(member as u64), ..settings };
-        let mut training = Training::new(&header, &rows, &validation, settings)?;
-        while training.ending().is_none() {
-            training.epoch()?;
-            *epochs += 1;
-        }
-        worst = worst.max(training.state().best_loss());
-        learnt.push(training.best().to_vec());
-    }
-    let strains: Vec<Voigt> = rows.iter().map(|row| row.c).collect();
-    let law = ensemble(header, &learnt)?.with_spread_limit(&strains).map_err(Error::from)?;
-    Ok((law, worst))
 }

@@ -1,7 +1,7 @@
 //! What bonds a lattice is built with, and what the kernel must look at for them.
 
 use super::LatticeBonds;
-use crate::bonds::Bonds;
+use crate::bonds::BodyGeometry;
 use crate::bonds::lattice_kernel::{Class, TILE};
 use crate::field::{CHUNK, chunk_range};
 use crate::geometry::{Cut, Gaps, cuts_within, severed};

@@ -4,7 +4,7 @@
 //! over the bond's length. All else of a body is in double precision.
 
 use super::LatticeBonds;
-use crate::bonds::Bonds;
+use crate::bonds::BondForces;
 use crate::bonds::lattice_kernel::{Factors, Tiles};
 use crate::bonds::rows::{LatticeKernel, StencilBond, single_kernel};
 use crate::field::{CHUNK, Field, chunk_range};
@@ -50,8 +50,8 @@ impl<const D: usize> Mixed<D> {
 }
 
 impl<const D: usize> LatticeBonds<D> {
-    /// Has [`Bonds::force`] evaluate bonds in single precision and sum their forces in double precision, from the next
-    /// [`Bonds::set_law`] on: forces of the displacement last given to [`Bonds::round`]. A law that single precision misses by more
+    /// Has [`BondForces::force`] evaluate bonds in single precision and sum their forces in double precision, from the next
+    /// [`BondForces::set_law`] on: forces of the displacement last given to [`crate::bonds::BondForces::prepare`]. A law that single precision misses by more
     /// than 1e-5 ([`KernelFit::single_error`]) stays in double precision.
     pub fn set_mixed(&mut self) {
         let displacement = std::array::from_fn(|_| vec![0.0; self.sites]);
@@ -63,7 +63,7 @@ impl<const D: usize> LatticeBonds<D> {
     }
 
     /// Root mean square of what forces in mixed precision differ by from those in double precision, over that of the latter, in the
-    /// displacement last given to [`Bonds::round`]; `None` without mixed precision.
+    /// displacement last given to [`crate::bonds::BondForces::prepare`]; `None` without mixed precision.
     pub fn mixed_error(&self, displacement: &Field<D>) -> Option<f64> {
         self.mixed.as_ref()?;
         let squares = |chunk: usize| {
@@ -80,7 +80,7 @@ impl<const D: usize> LatticeBonds<D> {
         Some(if force > 0.0 { (difference / force).sqrt() } else { 0.0 })
     }
 
-    /// [`Bonds::force`] in mixed precision; false where there is none.
+    /// [`BondForces::force`] in mixed precision; false where there is none.
     pub(super) fn mixed_force(
         &self,
         start: usize,

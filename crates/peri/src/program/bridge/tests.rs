@@ -1,5 +1,5 @@
 use super::{Model, export, import};
-use crate::bonds::{self, Bonds, LatticeBonds, VolumeCorrection};
+use crate::bonds::{self, BodyGeometry, BondDamage, BondForces, LatticeBonds, VolumeCorrection};
 use crate::field::Field;
 use crate::geometry::{Operation, Shape, lattice};
 use crate::potential::{BondPotential, KernelFit, Law};

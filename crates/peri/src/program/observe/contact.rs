@@ -2,7 +2,7 @@
 
 use super::moment::Moment;
 use super::values::axes;
-use crate::contact::Resting;
+use crate::contact::PlaneReaction;
 use crate::program::quantities as q;
 use crate::program::scene::{ContactSpec, Scene};
 use harness::observe::Scalars;
@@ -48,7 +48,7 @@ pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>
         for (d, axis) in axes(scene).iter().enumerate() {
             to.add_if(q::PLANE_FORCE.of(&[&name, axis]), |m| Some(resting(m)?.force[d]));
         }
-        let sizes: [fn(Resting) -> f64; 3] = [|one| one.area, |one| one.spread, |one| one.width];
+        let sizes: [fn(PlaneReaction) -> f64; 3] = [|one| one.area, |one| one.spread, |one| one.width];
         for (quantity, get) in [q::PLANE_AREA, q::PLANE_SPREAD, q::PLANE_WIDTH].iter().zip(sizes) {
             to.add_if(quantity.of(&[&name]), |m| resting(m).map(get));
         }

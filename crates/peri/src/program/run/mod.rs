@@ -185,11 +185,11 @@ fn run_variant<const D: usize>(
     if let Some(error) = &ended {
         // the last equilibrium has bonds that are broken by now
         body = Physics::<D>::new(source, scene, variant)?.0;
-        state.sever(&mut *body.bonds)?;
+        state.fracture.restore(&mut *body.bonds)?;
         outcome.error = Some(error.to_string());
     }
     if scene.dynamics.is_some() {
-        body.bonds.round(&state.displacement);
+        body.bonds.prepare(&state.displacement);
     }
     let moment = Moment::new((scene, &physics), &*body.bonds, &state, &phases);
     moment.stresses()?;
@@ -204,7 +204,7 @@ fn run_variant<const D: usize>(
     phases.borrow_mut().stop();
     outcome.work_of(&*body.bonds, &state);
     outcome.history.clone_from(&state.history);
-    outcome.events.clone_from(&state.events);
+    outcome.events.clone_from(&state.fracture.events);
     outcome.fragments = moment.fragments().to_vec();
     outcome.regions = scene::region_names(scene);
     let planes = scene.contact.iter().flat_map(|contact| contact.plane.iter().enumerate());
@@ -282,7 +282,7 @@ fn solve<const D: usize>(
         let moment = Moment::new((scene, physics), bonds, state, phases);
         observers.iter_mut().try_for_each(|observer| observer.see(&moment))?;
         frames.step(observers, &moment)?;
-        if state.round == 0 {
+        if state.control.round == 0 {
             under_way.step(|| seen(bonds, state));
         }
         phases.borrow_mut().start("solve");

@@ -115,17 +115,17 @@ impl Outcome {
             ("particles", bonds.particles().len() as u64),
             ("directed_bonds", directed),
             ("steps", state.step as u64),
-            ("iterations", state.total_iterations),
-            ("unconverged_searches", state.unconverged),
-            ("force_evaluations", state.evaluations),
-            ("bond_evaluations", state.bond_evaluations),
+            ("iterations", state.counts.total_iterations),
+            ("unconverged_searches", state.counts.unconverged),
+            ("force_evaluations", state.counts.evaluations),
+            ("bond_evaluations", state.counts.bond_evaluations),
             ("bytes_bonds", bonds.bytes() as u64),
         ] {
             self.work.push((name.to_owned(), count));
         }
-        if state.motion.bounds > 0 {
-            self.work.push(("frequency_bounds".to_owned(), state.motion.bounds));
-            self.work.push(("frequency_searches".to_owned(), state.motion.searches));
+        if state.motion.limits.bounds > 0 {
+            self.work.push(("frequency_bounds".to_owned(), state.motion.limits.bounds));
+            self.work.push(("frequency_searches".to_owned(), state.motion.limits.searches));
         }
     }
 

@@ -6,7 +6,7 @@ use super::memory;
 use super::values::{Body, needed, ordered, vector};
 use super::variant::Variant;
 use super::{Axis, Scene, ShapeKind, ShapeSpec};
-use crate::bonds::{Bonds, LatticeBonds};
+use crate::bonds::{BodyGeometry, BondDamage, LatticeBonds};
 use crate::calibrate::Space;
 use crate::geometry::{Cut, Gaps, MOST_CELLS, Operation, Shape, bounds, cell_counts, lattice};
 use harness::scene::{SceneError, Source};

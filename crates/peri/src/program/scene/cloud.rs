@@ -5,7 +5,7 @@ use super::Scene;
 use super::memory;
 use super::values::{Body, LARGEST_RATIO, needed, ordered, positive, vector};
 use super::variant::Variant;
-use crate::bonds::{Bonds, CloudBonds, LatticeBonds};
+use crate::bonds::{BodyGeometry, BondDamage, CloudBonds, LatticeBonds};
 use crate::geometry::{Cut, Gaps, recognise};
 use harness::scene::{SceneError, Source};
 use polycore::memory::{available, gib};
@@ -64,11 +64,8 @@ pub fn cloud<const D: usize>(
     }
     memory::refuse_too_large(source, scene, "body.horizon", &bonds)?;
     let half = 0.5 * bonds.spacing();
-    let extreme = |pick: fn(f64, f64) -> f64, from: f64| -> [f64; D] {
-        std::array::from_fn(|d| positions.iter().map(|p| p[d]).fold(from, pick))
-    };
-    let low = extreme(f64::min, f64::INFINITY).map(|x| x - half);
-    let high = extreme(f64::max, f64::NEG_INFINITY).map(|x| x + half);
+    let [low, high] = polycore::numerics::bounds(positions.iter().copied());
+    let (low, high) = (low.map(|x| x - half), high.map(|x| x + half));
     Ok(Body {
         bonds: Box::new(bonds),
         bounds: (low, high),

@@ -346,13 +346,7 @@ impl FieldSpec {
         let scale = placement.scale.unwrap_or(1.0);
         positive(source, &format!("{key}.scale"), scale, "")?;
         let origin = placement.origin.map_or([0.0; 3], |origin| origin.map(|x| x.si()));
-        let mut whole = Cuboid { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3] };
-        for point in points {
-            for d in 0..3 {
-                whole.min[d] = whole.min[d].min(point[d]);
-                whole.max[d] = whole.max[d].max(point[d]);
-            }
-        }
+        let mut whole = Cuboid::around(points);
         if let Some(depth) = placement.depth {
             if D == 3 || depth[0].si() >= depth[1].si() {
                 let found = if D == 3 { "a depth of a solid" } else { "a depth that does not increase" };

@@ -4,6 +4,7 @@ use super::values::Body;
 use super::{Method, Scene};
 use crate::contact::Plane;
 use harness::scene::{SceneError, Source};
+use polycore::numerics::range;
 
 /// n₁·n₂ of planes that face each other.
 const FACING: f64 = -0.99;
@@ -17,7 +18,7 @@ const PRESTRESSED: f64 = 0.01;
 const LOOKS: u32 = 100;
 
 /// A plane of a scene with a unit normal, and the range of the body's particles along it, m.
-struct Seen<const D: usize> {
+struct StretchScan<const D: usize> {
     name: String,
     plane: Plane<D>,
     low: f64,
@@ -26,7 +27,7 @@ struct Seen<const D: usize> {
     surface: f64,
 }
 
-impl<const D: usize> Seen<D> {
+impl<const D: usize> StretchScan<D> {
     /// Height of the plane over its place at rest along its normal, m, at a load factor and a time, s.
     fn raised(&self, factor: f64, time: f64) -> f64 {
         let Plane { normal, displacement, velocity, .. } = self.plane;
@@ -34,7 +35,11 @@ impl<const D: usize> Seen<D> {
     }
 }
 
-fn seen<const D: usize>(source: &Source, scene: &Scene, body: &Body<D>) -> Result<Vec<Seen<D>>, SceneError> {
+fn seen<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    body: &Body<D>,
+) -> Result<Vec<StretchScan<D>>, SceneError> {
     let Some(contact) = &scene.contact else { return Ok(Vec::new()) };
     let planes = contact.planes::<D>(source, scene.method() == Method::Verlet)?;
     let surface = body.surface();
@@ -43,13 +48,12 @@ fn seen<const D: usize>(source: &Source, scene: &Scene, body: &Body<D>) -> Resul
         plane.normal = plane.normal.map(|n| n / size);
         let heights =
             body.bonds.particles().iter().map(|&site| plane.height(body.bonds.position(site as usize)));
-        let (low, high) =
-            heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), h| (low.min(h), high.max(h)));
+        let [low, high] = range(heights);
         let faces = surface.faces().iter().map(|face| plane.height(face.place));
         let lowest = faces.fold(f64::INFINITY, f64::min);
         let of_particles = low - 0.5 * body.bonds.spacing();
         let lowest = if lowest.is_finite() { lowest } else { of_particles };
-        Seen { name: contact.plane[index].name(index), plane, low, high, surface: lowest }
+        StretchScan { name: contact.plane[index].name(index), plane, low, high, surface: lowest }
     });
     Ok(each.collect())
 }
@@ -148,7 +152,7 @@ pub(super) fn check<const D: usize>(
 
 /// Whether some point near the body is in front of all planes: the largest t with n_i·x − h_i ≥ t is positive. It is at a corner, where
 /// D + 1 of the constraints hold with equality.
-fn has_room<const D: usize>(planes: &[Seen<D>], body: &Body<D>, factor: f64, time: f64) -> bool {
+fn has_room<const D: usize>(planes: &[StretchScan<D>], body: &Body<D>, factor: f64, time: f64) -> bool {
     let (low, high) = body.bounds;
     let size = (0..D).map(|d| high[d] - low[d]).fold(0.0, f64::max);
     // n·x − t ≥ h of planes and of a box ten times the body
@@ -195,7 +199,7 @@ fn has_room<const D: usize>(planes: &[Seen<D>], body: &Body<D>, factor: f64, tim
 /// One sentence for each plane that presses at the start, or that will not reach the body.
 pub(super) fn warnings<const D: usize>(source: &Source, scene: &Scene, body: &Body<D>) -> Vec<String> {
     let (planes, spacing) = (seen(source, scene, body).unwrap_or_default(), body.bonds.spacing());
-    let of = |seen: &Seen<D>| {
+    let of = |seen: &StretchScan<D>| {
         let gap = seen.surface;
         if gap < -PRESTRESSED * spacing {
             return Some(format!(

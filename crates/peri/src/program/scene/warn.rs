@@ -1,7 +1,7 @@
 //! What is allowed and yet most likely not meant.
 
 use super::{Body, Scene};
-use crate::bonds::{Bonds, CellGrid, has_whole_family};
+use crate::bonds::{BodyGeometry, Bonds, CellGrid};
 use crate::geometry::{Cut, Operation, inside};
 use harness::scene::Source;
 
@@ -81,7 +81,7 @@ fn thin<const D: usize>(bonds: &dyn Bonds<D>) -> Option<String> {
     let lattice = bonds.as_lattice()?;
     let spacing = lattice.spacing();
     let lonely = |&&site: &&u32| {
-        if has_whole_family(bonds, site as usize) {
+        if bonds.has_whole_family(site as usize) {
             return false;
         }
         let mut beside = [false; D];

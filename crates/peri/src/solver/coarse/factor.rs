@@ -1,48 +1,15 @@
-//! Sparse Cholesky factors of a symmetric positive definite matrix, by faer: one symbolic analysis for each pattern.
-//!
-//! Always on one thread, so that the factors have the same bits wherever they are made.
+//! Cholesky factors in single precision: a preconditioner needs no more.
 
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt::factor::LltRegularization;
-use faer::sparse::linalg::SupernodalThreshold;
-use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
-};
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{Conj, MatMut, Par, Side};
+use polycore::numerics::cholesky::Cholesky;
+pub use polycore::numerics::cholesky::Pattern;
 
-/// Where the entries of an upper triangle are: column by column, rows ascending.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Pattern {
-    /// Where each column starts, and the number of entries.
-    pub starts: Vec<usize>,
-    /// Row of each entry.
-    pub rows: Vec<usize>,
-}
-
-impl Pattern {
-    /// Number of rows and columns.
-    pub fn size(&self) -> usize {
-        self.starts.len().saturating_sub(1)
-    }
-
-    /// Index of an entry.
-    #[cfg(test)]
-    fn find(&self, row: usize, column: usize) -> Option<usize> {
-        let range = self.starts[column]..self.starts[column + 1];
-        self.rows[range.clone()].binary_search(&row).ok().map(|at| range.start + at)
-    }
-}
-
-/// The factors in single precision, which a preconditioner needs no more than, and the analysis behind them.
+/// The factors, and the analysis behind them.
 pub struct Factor {
-    pattern: Pattern,
-    symbolic: SymbolicCholesky<usize>,
+    cholesky: Cholesky,
     values: Vec<f32>,
     /// Power of 2 that the matrix was divided by, so that its entries are about 1.
     scale: f64,
     right: Vec<f32>,
-    scratch: MemBuffer,
 }
 
 impl Factor {
@@ -51,60 +18,29 @@ impl Factor {
     /// double precision, or too large for the memory.
     pub fn new(pattern: Pattern, entries: &[f64], old: Option<Self>) -> Option<Self> {
         let mut factor = match old {
-            Some(old) if old.pattern == pattern => old,
-            _ => Self::analyse(pattern)?,
+            Some(old) if *old.cholesky.pattern() == pattern => old,
+            _ => {
+                let right = vec![0.0; pattern.size()];
+                Self { cholesky: Cholesky::analyse(pattern)?, values: Vec::new(), scale: 1.0, right }
+            }
         };
-        let size = factor.pattern.size();
         let scale = power_of_two(entries);
         let entries: Vec<f64> = entries.iter().map(|x| x / scale).collect();
-        let matrix = SparseColMatRef::new(symbolic(&factor.pattern, size), &entries[..]);
-        let parameters = Default::default();
-        let needed = factor.symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, parameters);
-        let mut memory = MemBuffer::try_new(needed).ok()?;
-        let mut values = vec![0.0; factor.symbolic.len_val()];
-        let none =
-            LltRegularization { dynamic_regularization_delta: 0.0, dynamic_regularization_epsilon: 0.0 };
-        factor
-            .symbolic
-            .factorize_numeric_llt(
-                &mut values,
-                matrix,
-                Side::Upper,
-                none,
-                Par::Seq,
-                MemStack::new(&mut memory),
-                parameters,
-            )
-            .ok()?;
+        let mut values = Vec::new();
+        if !factor.cholesky.factor(&entries, &mut values) {
+            return None;
+        }
         factor.values.clear();
         factor.values.extend(values.iter().map(|&x| x as f32));
         factor.scale = scale;
         factor.values.iter().all(|x| x.is_finite()).then_some(factor)
     }
 
-    fn analyse(pattern: Pattern) -> Option<Self> {
-        let parameters = CholeskySymbolicParams {
-            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
-            ..Default::default()
-        };
-        let order = SymmetricOrdering::Identity;
-        let matrix = symbolic(&pattern, pattern.size());
-        let symbolic = factorize_symbolic_cholesky(matrix, Side::Upper, order, parameters).ok()?;
-        let scratch = MemBuffer::try_new(symbolic.solve_in_place_scratch::<f32>(1, Par::Seq)).ok()?;
-        let right = vec![0.0; pattern.size()];
-        Some(Self { pattern, symbolic, values: Vec::new(), scale: 1.0, right, scratch })
-    }
-
     /// Overwrites b by A⁻¹ b, to single precision.
     pub fn solve(&mut self, right: &mut [f64]) {
         let scale = power_of_two(right);
         self.right.iter_mut().zip(&*right).for_each(|(single, x)| *single = (x / scale) as f32);
-        LltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(
-            Conj::No,
-            MatMut::from_column_major_slice_mut(&mut self.right, right.len(), 1),
-            Par::Seq,
-            MemStack::new(&mut self.scratch),
-        );
+        self.cholesky.solve(&self.values, &mut self.right);
         let back = scale / self.scale;
         right.iter_mut().zip(&self.right).for_each(|(x, &single)| *x = back * f64::from(single));
     }
@@ -119,10 +55,6 @@ impl Factor {
 fn power_of_two(values: &[f64]) -> f64 {
     let largest = values.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
     if largest > 0.0 && largest.is_finite() { largest.log2().floor().exp2() } else { 1.0 }
-}
-
-fn symbolic(pattern: &Pattern, size: usize) -> SymbolicSparseColMatRef<'_, usize> {
-    SymbolicSparseColMatRef::new_checked(size, size, &pattern.starts, None, &pattern.rows)
 }
 
 #[cfg(test)]
@@ -147,7 +79,6 @@ mod tests {
             }
             pattern.starts.push(pattern.rows.len());
         }
-        assert_eq!((pattern.find(3, 3), pattern.find(0, 5)), (Some(6), None));
         let exact: Vec<f64> = (0..size).map(|k| (k as f64).sin()).collect();
         let product = |entries: &[f64]| {
             let mut product = vec![0.0; size];

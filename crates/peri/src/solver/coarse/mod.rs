@@ -8,12 +8,13 @@ mod transfer;
 
 pub use stiffness::Survey;
 
-use crate::bonds::Bonds;
+use crate::bonds::BodyGeometry;
 use crate::field::Field;
 use crate::potential::BondPotential;
 use crate::solver::load::Loads;
 use crate::solver::places::in_order;
 use factor::{Factor, Pattern};
+use polycore::numerics::bounds;
 use pulp::Arch;
 use rayon::prelude::*;
 use space::{CORNERS, NONE, Space};
@@ -31,7 +32,7 @@ const BATCH: usize = 64;
 /// What a coarse level is built for.
 pub struct Body<'a, const D: usize> {
     /// The bonds.
-    pub bonds: &'a dyn Bonds<D>,
+    pub bonds: &'a dyn BodyGeometry<D>,
     /// The loads, for what they hold.
     pub loads: &'a Loads<D>,
     /// Where the body is.
@@ -75,7 +76,7 @@ impl<const D: usize> Coarse<D> {
     /// `None` where the body is too small or too broken for a coarse level.
     pub fn new(body: &Body<D>, edge: f64, most: usize, old: Option<Self>) -> Option<Self> {
         // a lattice's particle with every bond has neighbours on all sides; a cloud's may still be at a gap
-        let whole = if body.bonds.as_lattice().is_some() { body.survey.most } else { u32::MAX };
+        let whole = if body.bonds.whole_family().is_some() { body.survey.most } else { u32::MAX };
         let mut space = Space::new(body.bonds, &body.survey.bonded, whole, edge, most / D)?;
         let Body { bonds, loads, displacement, law, springs, survey, anchors } = *body;
         let assembly = Assembly::new(bonds, loads, displacement, survey, law, springs, space.edge);
@@ -192,13 +193,9 @@ fn hold<const D: usize>(
 }
 
 /// Diagonal of the bounding box, m.
-fn extent<const D: usize>(bonds: &dyn Bonds<D>) -> f64 {
-    let span = |d: usize| {
-        let places = bonds.particles().iter().map(|&site| bonds.position(site as usize)[d]);
-        let (low, high) = places.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
-        high - low + bonds.spacing()
-    };
-    (0..D).map(|d| span(d).powi(2)).sum::<f64>().sqrt()
+fn extent<const D: usize>(bonds: &dyn BodyGeometry<D>) -> f64 {
+    let [low, high] = bounds(bonds.particles().iter().map(|&site| bonds.position(site as usize)));
+    (0..D).map(|d| (high[d] - low[d] + bonds.spacing()).powi(2)).sum::<f64>().sqrt()
 }
 
 /// Functions that share an element with each function, up to itself.

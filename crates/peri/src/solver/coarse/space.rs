@@ -3,8 +3,9 @@
 //! The hat of a node is cut into one function for each part of the body that hangs together by intact bonds within the
 //! hat's support, so that no function moves both flanks of a crack, or a fragment with what it has left.
 
-use crate::bonds::Bonds;
+use crate::bonds::BodyGeometry;
 use crate::field::Field;
+use polycore::numerics::{Groups, Sets, bounds};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -49,15 +50,8 @@ struct Grid<const D: usize> {
 
 impl<const D: usize> Grid<D> {
     /// Cells of about `edge`, which the box holds a whole number of.
-    fn new(bonds: &dyn Bonds<D>, edge: f64) -> Self {
-        let (mut low, mut high) = ([f64::INFINITY; D], [f64::NEG_INFINITY; D]);
-        for &site in bonds.particles() {
-            let position = bonds.position(site as usize);
-            for d in 0..D {
-                low[d] = low[d].min(position[d]);
-                high[d] = high[d].max(position[d]);
-            }
-        }
+    fn new(bonds: &dyn BodyGeometry<D>, edge: f64) -> Self {
+        let [low, high] = bounds(bonds.particles().iter().map(|&site| bonds.position(site as usize)));
         let cells: [usize; D] = std::array::from_fn(|d| ((high[d] - low[d]) / edge).ceil().max(1.0) as usize);
         // a box without extent along an axis still has a cell there
         let edge = std::array::from_fn(|d| {
@@ -117,10 +111,8 @@ impl<const D: usize> Grid<D> {
 
 /// The bonded particles of each cell.
 struct Filled<const D: usize> {
-    /// Where each cell begins in `members`, and the end.
-    starts: Vec<usize>,
     /// Sites, ascending in each cell.
-    members: Vec<u32>,
+    members: Groups<u32>,
     /// Whether every particle of a cell has all bonds around it.
     is_whole: Vec<bool>,
     /// Coordinates of each site in its cell, 0 to 1.
@@ -128,45 +120,23 @@ struct Filled<const D: usize> {
 }
 
 impl<const D: usize> Filled<D> {
-    fn new(grid: &Grid<D>, bonds: &dyn Bonds<D>, bonded: &[u32], whole: u32) -> Self {
+    fn new(grid: &Grid<D>, bonds: &dyn BodyGeometry<D>, bonded: &[u32], whole: u32) -> Self {
         let mut local = Field::zeros(bonds.sites());
         let cells: usize = grid.cells.iter().product();
-        let mut starts = vec![0_usize; cells + 1];
-        let mut cell_of = Vec::with_capacity(bonds.particles().len());
+        let mut members = Vec::with_capacity(bonds.particles().len());
         let mut is_whole = vec![true; cells];
-        for &site in bonds.particles() {
-            let site = site as usize;
-            if bonded[site] == 0 {
-                cell_of.push(NONE);
-                continue;
-            }
-            let (cell, at) = grid.locate(bonds.position(site));
-            local.set(site, at);
-            cell_of.push(cell as u32);
-            starts[cell + 1] += 1;
-            is_whole[cell] &= bonded[site] >= whole;
+        for &site in bonds.particles().iter().filter(|&&site| bonded[site as usize] > 0) {
+            let (cell, at) = grid.locate(bonds.position(site as usize));
+            local.set(site as usize, at);
+            members.push((cell, site));
+            is_whole[cell] &= bonded[site as usize] >= whole;
         }
-        for cell in 0..cells {
-            starts[cell + 1] += starts[cell];
-        }
-        let mut members = vec![0; starts[cells]];
-        let mut next = starts.clone();
-        for (&site, &cell) in bonds.particles().iter().zip(&cell_of) {
-            if cell != NONE {
-                members[next[cell as usize]] = site;
-                next[cell as usize] += 1;
-            }
-        }
-        Self { starts, members, is_whole, local }
-    }
-
-    fn of_cell(&self, cell: usize) -> &[u32] {
-        &self.members[self.starts[cell]..self.starts[cell + 1]]
+        Self { members: Groups::new(cells, members.iter().copied()), is_whole, local }
     }
 
     /// Whether a particle lies beside a node.
     fn is_beside(&self, grid: &Grid<D>, node: usize) -> bool {
-        grid.cells_around(node).any(|cell| !self.of_cell(cell).is_empty())
+        grid.cells_around(node).any(|cell| !self.members.of(cell).is_empty())
     }
 
     /// Nodes beside a particle: that many functions at least.
@@ -185,7 +155,13 @@ struct Split {
 impl<const D: usize> Space<D> {
     /// Cells of about `edge`, larger ones if there would be more than `most` functions; `None` where even that does not help.
     /// `bonded` has the number of bonds of each site, `whole` that from which on nothing is missing around a particle.
-    pub fn new(bonds: &dyn Bonds<D>, bonded: &[u32], whole: u32, edge: f64, most: usize) -> Option<Self> {
+    pub fn new(
+        bonds: &dyn BodyGeometry<D>,
+        bonded: &[u32],
+        whole: u32,
+        edge: f64,
+        most: usize,
+    ) -> Option<Self> {
         let mut edge = edge;
         for _ in 0..24 {
             let grid = Grid::new(bonds, edge);
@@ -212,7 +188,7 @@ impl<const D: usize> Space<D> {
         None
     }
 
-    fn on(grid: &Grid<D>, filled: Filled<D>, bonds: &dyn Bonds<D>) -> Self {
+    fn on(grid: &Grid<D>, filled: Filled<D>, bonds: &dyn BodyGeometry<D>) -> Self {
         let (sites, cells) = (bonds.sites(), filled.is_whole.len());
         // what hangs together around each node
         let nodes: usize = grid.node_counts().iter().product();
@@ -225,7 +201,7 @@ impl<const D: usize> Space<D> {
             .map(|batch| {
                 let mut place = vec![NONE; sites];
                 let window = |node: usize| -> Vec<u32> {
-                    grid.cells_around(node).flat_map(|cell| filled.of_cell(cell).iter().copied()).collect()
+                    grid.cells_around(node).flat_map(|cell| filled.members.of(cell).iter().copied()).collect()
                 };
                 let split = |&node: &usize| Some((node, split(bonds, window(node), &mut place)?));
                 batch.iter().filter_map(split).collect()
@@ -244,12 +220,12 @@ impl<const D: usize> Space<D> {
             edge: grid.edge,
             functions: functions as usize,
             elements: Vec::new(),
-            members: Vec::with_capacity(filled.members.len()),
+            members: Vec::with_capacity(filled.members.items().len()),
             element_of: vec![NONE; sites],
             local: Field::zeros(0),
         };
-        for cell in (0..cells).filter(|&cell| !filled.of_cell(cell).is_empty()) {
-            space.add_cell(grid, cell, filled.of_cell(cell), &splits, &first);
+        for cell in (0..cells).filter(|&cell| !filled.members.of(cell).is_empty()) {
+            space.add_cell(grid, cell, filled.members.of(cell), &splits, &first);
         }
         space.local = filled.local;
         space
@@ -314,12 +290,16 @@ impl<const D: usize> Space<D> {
 
 /// The parts of a window that hang together by bonds within it, numbered by their first site; `None` for one part.
 /// `place` holds [`NONE`] for every site, before and after.
-fn split<const D: usize>(bonds: &dyn Bonds<D>, mut window: Vec<u32>, place: &mut [u32]) -> Option<Split> {
+fn split<const D: usize>(
+    bonds: &dyn BodyGeometry<D>,
+    mut window: Vec<u32>,
+    place: &mut [u32],
+) -> Option<Split> {
     window.sort_unstable();
     for (index, &site) in window.iter().enumerate() {
         place[site as usize] = index as u32;
     }
-    let mut parent: Vec<u32> = (0..window.len() as u32).collect();
+    let mut joined = Sets::new(window.len());
     let mut parts = window.len();
     // sites far from each other first: few families hold a window together
     let far = |start: usize| (start..window.len()).step_by(STRIDE);
@@ -329,13 +309,8 @@ fn split<const D: usize>(bonds: &dyn Bonds<D>, mut window: Vec<u32>, place: &mut
         }
         bonds.neighbours(window[index] as usize, &mut |bond| {
             let other = place[bond.site];
-            if other != NONE {
-                let (a, b) = (root(&mut parent, index as u32), root(&mut parent, other));
-                if a != b {
-                    // the smaller index is the root, whatever the order of bonds
-                    parent[a.max(b) as usize] = a.min(b);
-                    parts -= 1;
-                }
+            if other != NONE && joined.join(index as u32, other) {
+                parts -= 1;
             }
         });
     }
@@ -347,7 +322,7 @@ fn split<const D: usize>(bonds: &dyn Bonds<D>, mut window: Vec<u32>, place: &mut
     let mut count = 0;
     let mut part_of = Vec::with_capacity(window.len());
     for index in 0..window.len() {
-        let root = root(&mut parent, index as u32) as usize;
+        let root = joined.root(index as u32) as usize;
         if number[root] == NONE {
             number[root] = count;
             count += 1;
@@ -355,15 +330,6 @@ fn split<const D: usize>(bonds: &dyn Bonds<D>, mut window: Vec<u32>, place: &mut
         part_of.push((window[index], number[root]));
     }
     Some(Split { parts: count, part_of })
-}
-
-fn root(parent: &mut [u32], index: u32) -> u32 {
-    let mut at = index;
-    while parent[at as usize] != at {
-        parent[at as usize] = parent[parent[at as usize] as usize];
-        at = parent[at as usize];
-    }
-    at
 }
 
 /// Nodes of a grid in nested dissection: both halves first, the plane between them last.

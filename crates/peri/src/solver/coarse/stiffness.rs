@@ -3,7 +3,7 @@
 //! of direction m; the Hessian of the bonds' energy where the functions are linear within a horizon.
 
 use super::space::{CORNERS, Element, Space};
-use crate::bonds::Bonds;
+use crate::bonds::{BodyGeometry, Bonds};
 use crate::field::Field;
 use crate::potential::BondPotential;
 use crate::solver::load::Loads;
@@ -100,7 +100,7 @@ impl Tangents {
 
 /// What element matrices are made of.
 pub struct Assembly<'a, const D: usize> {
-    bonds: &'a dyn Bonds<D>,
+    bonds: &'a dyn BodyGeometry<D>,
     loads: &'a Loads<D>,
     displacement: &'a Field<D>,
     survey: &'a Survey,
@@ -122,7 +122,7 @@ pub struct Assembly<'a, const D: usize> {
 impl<'a, const D: usize> Assembly<'a, D> {
     /// `law` comes with kθ and the λ of the volume beside it, and the stretches that it is fitted over.
     pub fn new(
-        bonds: &'a dyn Bonds<D>,
+        bonds: &'a dyn BodyGeometry<D>,
         loads: &'a Loads<D>,
         displacement: &'a Field<D>,
         survey: &'a Survey,
@@ -151,7 +151,7 @@ impl<'a, const D: usize> Assembly<'a, D> {
             tangents,
             modulus,
             springs,
-            lattice: bonds.as_lattice().is_some(),
+            lattice: bonds.whole_family().is_some(),
             interior,
             cell,
             full,

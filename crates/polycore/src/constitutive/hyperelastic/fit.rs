@@ -7,13 +7,13 @@
 
 use std::cell::Cell;
 
-use levenberg_marquardt::LevenbergMarquardt;
 use nalgebra::DVector;
 
 use super::data::Table;
 use super::descriptor::Start;
-use super::fit_map::{Map, Problem, REJECTED};
+use super::fit_map::{Map, REJECTED};
 use super::{Error, Hyperelastic, ModelDescriptor, homogeneous};
+use crate::numerics::least_squares::{Found, levenberg_marquardt};
 
 /// A fitted law.
 pub struct Fit {
@@ -144,9 +144,14 @@ pub fn fit_until(
     }
     let modulus = neo_hookean_modulus(table)?;
     let map = Map::new(model, table, modulus)?;
-    let solver = LevenbergMarquardt::new().with_patience(200);
     let mut ends: Vec<(f64, DVector<f64>)> = Vec::new();
-    let mut iterations = 0;
+    let iterations = Cell::new(0);
+    let residuals = |q: &DVector<f64>| {
+        iterations.set(iterations.get() + 1);
+        // a trial where the law overflows must be rejected; `None` would end the search
+        let rejected = || DVector::from_element(measurements, REJECTED);
+        Some(map.residuals(q, table).unwrap_or_else(rejected))
+    };
     let start = Start { limits: &map.limits, modulus, table, stop };
     let mut starts = (model.starts)(&start);
     for contained in model.contains {
@@ -167,12 +172,12 @@ pub fn fit_until(
         }
         starts.extend(grown);
     }
-    let mut search = |from: &[f64], ends: &mut Vec<(f64, DVector<f64>)>| {
-        let problem = Problem { map: &map, table, at: map.inverse(from), evaluations: Cell::new(0), stop };
-        let (problem, report) = solver.minimize(problem);
-        iterations += problem.evaluations.get();
-        if report.objective_function < REJECTED && map.residuals(&problem.at, table).is_some() {
-            ends.push((report.objective_function, problem.at));
+    let search = |from: &[f64], ends: &mut Vec<(f64, DVector<f64>)>| {
+        // nothing ends the search
+        let jacobian = |q: &DVector<f64>| if stop() { None } else { map.jacobian(q, table) };
+        let Found { at, objective } = levenberg_marquardt(map.inverse(from), 200, residuals, jacobian);
+        if objective < REJECTED && map.residuals(&at, table).is_some() {
+            ends.push((objective, at));
         }
     };
     for from in &starts {
@@ -193,7 +198,11 @@ pub fn fit_until(
         return Err(Error::Stopped);
     }
     let Some((least, best)) = ends.iter().min_by(by_misfit) else {
-        return Err(Error::NoConvergence { iteration: model.key, steps: iterations, residual: f64::NAN });
+        return Err(Error::NoConvergence {
+            iteration: model.key,
+            steps: iterations.get(),
+            residual: f64::NAN,
+        });
     };
     let values = map.parameters(best);
     let law = model.law(&values)?;
@@ -215,6 +224,7 @@ pub fn fit_until(
         })
         .collect();
     let starts = (starts.len(), agreeing.min(starts.len()));
+    let iterations = iterations.get();
     Ok(Fit { law, model, parameters, rms, draws: found.draws, measurements, iterations, starts })
 }
 

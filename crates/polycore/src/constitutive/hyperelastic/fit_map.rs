@@ -1,9 +1,6 @@
 //! Fits in parameters without bounds: the optimiser's problem, and what the data say at its end.
 
-use std::cell::Cell;
-
-use levenberg_marquardt::LeastSquaresProblem;
-use nalgebra::{DMatrix, DVector, Dyn, Owned};
+use nalgebra::{DMatrix, DVector};
 
 use super::data::{State, Table};
 use super::descriptor::UNLIMITED;
@@ -111,7 +108,7 @@ impl<'a> Map<'a> {
     }
 
     /// dr/dq, in closed form or by central differences of step ∛ε, good to 1e-10.
-    fn jacobian(&self, q: &DVector<f64>, table: &Table) -> Option<DMatrix<f64>> {
+    pub(super) fn jacobian(&self, q: &DVector<f64>, table: &Table) -> Option<DMatrix<f64>> {
         if let Some(slopes) = self.model.slopes {
             let values: Vec<(f64, f64)> = (0..q.len()).map(|i| self.value(i, q[i])).collect();
             let p: Vec<f64> = values.iter().map(|value| value.0).collect();
@@ -209,39 +206,3 @@ impl<'a> Map<'a> {
 
 /// A residual in units of the modulus that no step is accepted with.
 pub(super) const REJECTED: f64 = 1e100;
-
-/// A least-squares problem in q.
-pub(super) struct Problem<'a> {
-    pub map: &'a Map<'a>,
-    pub table: &'a Table,
-    pub at: DVector<f64>,
-    pub evaluations: Cell<usize>,
-    /// Whether the user asks the search to end.
-    pub stop: &'a dyn Fn() -> bool,
-}
-
-impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
-    type ResidualStorage = Owned<f64, Dyn>;
-    type JacobianStorage = Owned<f64, Dyn, Dyn>;
-    type ParameterStorage = Owned<f64, Dyn>;
-
-    fn set_params(&mut self, q: &DVector<f64>) {
-        self.at.copy_from(q);
-    }
-
-    fn params(&self) -> DVector<f64> {
-        self.at.clone()
-    }
-
-    fn residuals(&self) -> Option<DVector<f64>> {
-        self.evaluations.set(self.evaluations.get() + 1);
-        // a trial where the law overflows must be rejected; `None` would end the search
-        let rejected = || DVector::from_element(self.table.measurements(), REJECTED);
-        Some(self.map.residuals(&self.at, self.table).unwrap_or_else(rejected))
-    }
-
-    fn jacobian(&self) -> Option<DMatrix<f64>> {
-        // nothing ends the search
-        if (self.stop)() { None } else { self.map.jacobian(&self.at, self.table) }
-    }
-}

@@ -2,32 +2,34 @@
 //! runs along the valleys in which a modulus and its exponent make up for each other ("variable projection"; Golub & Pereyra,
 //! doi:10.1137/0710036, with Kaufman's derivative, doi:10.1007/BF01932995).
 
-use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
-use nalgebra::{DMatrix, DVector, Dyn, Owned};
+use nalgebra::{DMatrix, DVector};
 
 use super::descriptor::{ABSENT, Start};
 use super::ogden::slopes;
+use crate::numerics::least_squares::levenberg_marquardt;
 
 /// A start, moved to where the exponents are best; itself where the search fails.
 pub(super) fn projected(p: &[f64], start: &Start<'_>) -> Vec<f64> {
     let data = start.table.states.iter().flat_map(|state| state.nominal).filter(|data| *data != 0.0);
     let data = DVector::from_iterator(start.table.measurements(), data) / start.modulus;
     let exponents = DVector::from_iterator(p.len() / 2, p.chunks_exact(2).map(|term| term[1]));
-    let problem = Projected { start, data, exponents };
-    let (problem, _) = LevenbergMarquardt::new().with_patience(100).minimize(problem);
-    let Some(best) = problem.solve().filter(|best| best.moduli.iter().any(|modulus| *modulus > 0.0)) else {
+    let problem = Projected { start, data };
+    let (residuals, jacobian) = (|at: &_| Some(problem.residuals(at)), |at: &_| problem.jacobian(at));
+    let exponents = levenberg_marquardt(exponents, 100, residuals, jacobian).at;
+    let Some(best) =
+        problem.solve(&exponents).filter(|best| best.moduli.iter().any(|modulus| *modulus > 0.0))
+    else {
         return p.to_vec();
     };
     let least = ABSENT * best.moduli.sum();
-    let term = |i: usize| [start.modulus * best.moduli[i].max(least), problem.exponents[i]];
-    (0..problem.exponents.len()).flat_map(term).collect()
+    let term = |i: usize| [start.modulus * best.moduli[i].max(least), exponents[i]];
+    (0..exponents.len()).flat_map(term).collect()
 }
 
 struct Projected<'a> {
     start: &'a Start<'a>,
     /// Measured stresses in units of the modulus.
     data: DVector<f64>,
-    exponents: DVector<f64>,
 }
 
 /// The best moduli, in units of the modulus; 0 of terms that would only be of use below.
@@ -40,9 +42,9 @@ struct Moduli {
 
 impl Projected<'_> {
     /// Stresses of each term of unit modulus, and their derivatives with respect to its exponent.
-    fn columns(&self) -> Option<[DMatrix<f64>; 2]> {
-        let terms = self.exponents.len();
-        let unit: Vec<f64> = self.exponents.iter().flat_map(|exponent| [1.0, *exponent]).collect();
+    fn columns(&self, exponents: &DVector<f64>) -> Option<[DMatrix<f64>; 2]> {
+        let terms = exponents.len();
+        let unit: Vec<f64> = exponents.iter().flat_map(|exponent| [1.0, *exponent]).collect();
         let mut all = [DMatrix::zeros(self.data.len(), terms), DMatrix::zeros(self.data.len(), terms)];
         let mut found = vec![[0.0; 2]; 2 * terms];
         let mut row = 0;
@@ -59,9 +61,9 @@ impl Projected<'_> {
         all.iter().flat_map(|matrix| matrix.iter()).all(|value| value.is_finite()).then_some(all)
     }
 
-    fn solve(&self) -> Option<Moduli> {
-        let [columns, _] = self.columns()?;
-        let terms = self.exponents.len();
+    fn solve(&self, exponents: &DVector<f64>) -> Option<Moduli> {
+        let [columns, _] = self.columns(exponents)?;
+        let terms = exponents.len();
         let mut best: Option<(f64, Moduli)> = None;
         for present in 1_usize..1 << terms {
             let those: Vec<usize> = (0..terms).filter(|i| present >> i & 1 == 1).collect();
@@ -83,33 +85,19 @@ impl Projected<'_> {
         }
         best.map(|(_, found)| found)
     }
-}
 
-impl LeastSquaresProblem<f64, Dyn, Dyn> for Projected<'_> {
-    type ResidualStorage = Owned<f64, Dyn>;
-    type JacobianStorage = Owned<f64, Dyn, Dyn>;
-    type ParameterStorage = Owned<f64, Dyn>;
-
-    fn set_params(&mut self, exponents: &DVector<f64>) {
-        self.exponents.copy_from(exponents);
-    }
-
-    fn params(&self) -> DVector<f64> {
-        self.exponents.clone()
-    }
-
-    fn residuals(&self) -> Option<DVector<f64>> {
+    fn residuals(&self, exponents: &DVector<f64>) -> DVector<f64> {
         // nothing fits: as without any term, so that a trial there is rejected
-        Some(self.solve().map_or_else(|| -&self.data, |found| found.residuals))
+        self.solve(exponents).map_or_else(|| -&self.data, |found| found.residuals)
     }
 
-    fn jacobian(&self) -> Option<DMatrix<f64>> {
+    fn jacobian(&self, exponents: &DVector<f64>) -> Option<DMatrix<f64>> {
         // nothing ends the search
         if (self.start.stop)() {
             return None;
         }
-        let [_, mut slopes] = self.columns()?;
-        let found = self.solve()?;
+        let [_, mut slopes] = self.columns(exponents)?;
+        let found = self.solve(exponents)?;
         for (i, mut column) in slopes.column_iter_mut().enumerate() {
             column *= found.moduli[i];
         }

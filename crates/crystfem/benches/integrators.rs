@@ -1,0 +1,77 @@
+//! Error against run time of the time integrators.
+
+use crate::Failure;
+use crate::median;
+use crystfem::exact::cube::{Cube, END, Start};
+use crystfem::simulation::{LinearSolver, Settings, Simulation};
+use crystfem::time::{Scheme, Steps};
+use evidence::measurement::Measurement;
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+/// Numbers of equal steps; tolerances of adaptive ones, K.
+const STEPS: [u32; 8] = [4, 8, 16, 32, 64, 128, 256, 512];
+const TOLERANCES: [f64; 7] = [10.0, 3.0, 1.0, 0.3, 0.1, 0.03, 0.01];
+/// Timings, of which the median counts.
+const REPEATS: usize = 3;
+/// What linear solves may leave, K: well below the errors of the steps.
+const SOLVES: f64 = 1e-6;
+
+/// Rows `SCHEME-MODE LENGTH: QUANTITY, PROBLEM`.
+pub fn measure(elements: usize) -> Result<Vec<Measurement>, Failure> {
+    let mut rows = Vec::new();
+    for (problem, start) in [("smooth", Start::Smooth), ("quenched", Start::Quenched)] {
+        let cube = Cube::new(elements, start);
+        for (name, scheme) in [("backward-euler", Scheme::BackwardEuler), ("tr-bdf2", Scheme::TrBdf2)] {
+            let fixed = STEPS.map(|count| {
+                let dt = END / f64::from(count);
+                (format!("{name}-fixed {count}"), Steps::Fixed { dt })
+            });
+            let adaptive = TOLERANCES.map(|tolerance| {
+                let (first, largest) = (1e-6 * END, END);
+                let steps = Steps::Adaptive { tolerance, first, smallest: 1e-6 * first, largest };
+                (format!("{name}-adaptive {tolerance}"), steps)
+            });
+            for (name, steps) in fixed.into_iter().chain(adaptive) {
+                let solver = LinearSolver::ConjugateGradients;
+                let of = [name.as_str(), problem];
+                run(&cube, of, Settings { scheme, steps, tolerance: SOLVES, solver }, &mut rows)?;
+            }
+        }
+    }
+    Ok(rows)
+}
+
+fn run(
+    cube: &Cube,
+    [name, problem]: [&str; 2],
+    settings: Settings,
+    rows: &mut Vec<Measurement>,
+) -> Result<(), Failure> {
+    let mut seconds = Vec::new();
+    let mut work = Default::default();
+    for _ in 0..REPEATS {
+        let mut simulation = Simulation::new(cube.problem()?, settings)?;
+        let since = Instant::now();
+        simulation.run_until(END)?;
+        seconds.push(since.elapsed().as_secs_f64());
+        work = simulation.state().work;
+    }
+    // once more, with a look at each step
+    let mut squares = 0.0;
+    let mut simulation = Simulation::new(cube.problem()?, settings)?;
+    let _ = simulation.advance(END, &mut |simulation, step| {
+        squares += step.dt * cube.mean_square(simulation, |lambda| (-lambda * step.time).exp());
+        ControlFlow::Continue(())
+    })?;
+    let threads = rayon::current_num_threads();
+    let mut push = |quantity: &str, value: f64, unit: &str| {
+        let what = format!("{name}: {quantity}, {problem}");
+        rows.push(Measurement::new(what, cube.size(), threads, value, unit));
+    };
+    push("error", (squares / END).sqrt(), "K");
+    push("time", median(seconds), "s");
+    push("steps", (work.steps + work.rejected) as f64, "");
+    push("cg iterations", work.cg_iterations as f64, "");
+    Ok(())
+}

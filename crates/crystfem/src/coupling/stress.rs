@@ -1,0 +1,323 @@
+//! Stress and warpage of a part on its way through the temperatures of a simulation.
+
+use super::bed::{bed_nodes, loose_elements, out_of_flatness, remove_rigid_motion, statically_determinate};
+use crate::error::Error;
+use crate::mechanics::{Body, BodyState, EnergyBalance, MOST, SolidifyingMaxwell, Support, points, shares};
+use crate::mesh::Mesh;
+use crate::simulation::Simulation;
+use polycore::tensor::von_mises;
+
+/// Residual over the load at which a solution ends: its error is far below that of the model.
+const TOLERANCE: f64 = 1e-8;
+
+/// Default of [`StressSettings::strain_step`].
+pub const STRAIN_STEP: f64 = 2e-4;
+
+/// A part that bears stress.
+#[derive(Clone, Debug)]
+pub struct StressSettings {
+    /// Mechanical constants.
+    pub law: SolidifyingMaxwell,
+    /// Relative crystallinity α of fresh material; default 0.
+    pub initial_alpha: f64,
+    /// Whether each element bears stress.
+    pub bears: Vec<bool>,
+    /// Nodes on the bed, ascending, which are held during the print.
+    pub bed: Vec<u32>,
+    /// Largest change of the linear free strain in any element between two solutions; default [`STRAIN_STEP`].
+    pub strain_step: f64,
+    /// Whether the part is taken off the bed at the end; default true.
+    pub release: bool,
+}
+
+impl StressSettings {
+    /// Settings of the bearing elements of a mesh, held at the nodes of [`bed_nodes`].
+    ///
+    /// # Errors
+    /// Those of [`bed_nodes`].
+    pub fn new(
+        mesh: &Mesh,
+        law: SolidifyingMaxwell,
+        bears: Vec<bool>,
+        bed: Option<&str>,
+    ) -> Result<Self, Error> {
+        let bed = bed_nodes(mesh, &bears, bed)?;
+        Ok(Self { law, initial_alpha: 0.0, bears, bed, strain_step: STRAIN_STEP, release: true })
+    }
+}
+
+/// State of an element at the last solution.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+struct Thermal {
+    /// Temperatures of the nodes, K, and their number.
+    nodes: [f64; MOST],
+    count: usize,
+    /// α.
+    degree: f64,
+    /// s.
+    time: f64,
+}
+
+/// State of a coupling, for checkpoints.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct StressState {
+    body: BodyState,
+    last: Vec<Option<Thermal>>,
+    solutions: u64,
+    mises_on_bed: f64,
+}
+
+/// Quasi-static stress of a part whose free strain follows temperature and crystallization ([`SolidifyingMaxwell`]): no
+/// effect back on temperatures.
+pub struct StressCoupling<'a> {
+    settings: StressSettings,
+    mesh: &'a Mesh,
+    body: Body<'a>,
+    state: StressState,
+}
+
+impl<'a> StressCoupling<'a> {
+    /// Begins with an empty part on the mesh of a simulation.
+    ///
+    /// # Errors
+    /// Those of [`Body::new`]; [`Error::Mesh`] for fewer than three nodes on the bed, and elements without a way to it.
+    pub fn new(mesh: &'a Mesh, settings: StressSettings) -> Result<Self, Error> {
+        let mut body = Body::new(mesh, settings.law.poisson)?;
+        body.tolerance = TOLERANCE;
+        if settings.bed.len() < 3 {
+            let found = settings.bed.len();
+            return Err(Error::Mesh(format!("{found} nodes of the part on the bed; allowed: at least 3")));
+        }
+        let loose = loose_elements(mesh, &settings.bears, &settings.bed);
+        if loose > 0 {
+            return Err(Error::Mesh(format!(
+                "{loose} elements are not connected with the bed; allowed: none"
+            )));
+        }
+        let state = StressState { last: vec![None; settings.bears.len()], ..StressState::default() };
+        Ok(Self { settings, mesh, body, state })
+    }
+
+    /// Returns the state.
+    pub fn save(&self) -> StressState {
+        StressState { body: self.body.state.clone(), ..self.state.clone() }
+    }
+
+    /// Continues from a state of the same part.
+    pub fn restore(&mut self, mut state: StressState) {
+        self.body.state = std::mem::take(&mut state.body);
+        self.state = state;
+    }
+
+    /// Updates after an accepted step, and before the first: activates new elements; solves if the free strain changed by
+    /// more than the strain step, or if elements appear next.
+    ///
+    /// # Errors
+    /// Those of [`Body::step`].
+    pub fn after_step(&mut self, simulation: &Simulation) -> Result<(), Error> {
+        self.update(simulation, false)
+    }
+
+    /// Solves at the end of a simulation, and takes the part off the bed where the settings say so: a step of no duration
+    /// with six supports.
+    ///
+    /// # Errors
+    /// Those of [`Body::step`].
+    pub fn finish(&mut self, simulation: &Simulation) -> Result<(), Error> {
+        self.update(simulation, true)?;
+        self.state.mises_on_bed = self.largest_mises();
+        if self.settings.release {
+            let bed = self.present_bed(&self.displacement());
+            let present = self.state.last.clone();
+            self.solve(&present, &statically_determinate(self.mesh, &bed))?;
+            let bed = self.present_bed(&self.displacement());
+            remove_rigid_motion(self.mesh, &bed, &mut self.body.state.displacement);
+        }
+        Ok(())
+    }
+
+    fn update(&mut self, simulation: &Simulation, must: bool) -> Result<(), Error> {
+        let time = simulation.time();
+        let degrees = simulation.element_means("alpha");
+        let births = &simulation.problem().births;
+        let now = |element: usize| -> Option<Thermal> {
+            let (mut nodes, own) = ([0.0; MOST], self.mesh.nodes(element as u32));
+            for (value, &node) in nodes.iter_mut().zip(own) {
+                *value = simulation.temperature(node)?;
+            }
+            Some(Thermal { nodes, count: own.len(), degree: degrees[element].unwrap_or(0.0), time })
+        };
+        let StressSettings { law, bears, .. } = &self.settings;
+        let mut present = vec![None; bears.len()];
+        let (mut born, mut change) = (Vec::new(), 0.0_f64);
+        for element in (0..bears.len()).filter(|&element| bears[element]) {
+            if !simulation.is_born(element as u32) {
+                continue;
+            }
+            present[element] = now(element);
+            if self.state.last[element].is_none() {
+                // its own temperature at birth: what it shares with neighbours at once is a part of its strain
+                let birth = (simulation.state().born[element] as usize).checked_sub(1);
+                self.state.last[element] = match birth.and_then(|birth| births.get(birth)) {
+                    Some(birth) => Some(Thermal {
+                        nodes: [birth.temperature; MOST],
+                        count: self.mesh.nodes(element as u32).len(),
+                        degree: self.settings.initial_alpha,
+                        time: birth.time,
+                    }),
+                    None => present[element],
+                };
+                born.push(element);
+            }
+            if let (Some(before), Some(after)) = (self.state.last[element], present[element]) {
+                let strain =
+                    |[from, to]: [f64; 2]| law.volume.strain([from, before.degree], [to, after.degree]);
+                let pairs = before.nodes.into_iter().zip(after.nodes).take(after.count);
+                change = pairs.map(|(from, to)| strain([from, to]).abs()).fold(change, f64::max);
+            }
+        }
+        self.body.born(born, law.branches());
+        // who is born now must not take part in what happened before
+        let about = births.get(simulation.state().births).is_some_and(|birth| birth.time <= time);
+        if must || about || change > self.settings.strain_step {
+            let bed = self.settings.bed.iter();
+            let supports: Vec<Support> = bed.flat_map(|&node| (0..3).map(move |d| (node, d))).collect();
+            self.solve(&present, &supports)?;
+            self.state.last = present;
+        }
+        Ok(())
+    }
+
+    /// One solution from the last states of elements to the present ones.
+    fn solve(&mut self, present: &[Option<Thermal>], supports: &[Support]) -> Result<(), Error> {
+        let (law, last) = (&self.settings.law, &self.state.last);
+        if last.iter().all(Option::is_none) {
+            return Ok(());
+        }
+        let pair = |element: usize| {
+            let after = present[element].or(last[element]);
+            let before = last[element].or(after);
+            before.zip(after)
+        };
+        self.body.step(
+            |element| match pair(element) {
+                Some((before, after)) => law.increment(before.mean(), after.mean(), after.time - before.time),
+                None => law.increment([300.0, 0.0], [300.0, 0.0], 0.0),
+            },
+            |element, point, _| {
+                let Some((before, after)) = pair(element) else { return 0.0 };
+                law.volume.strain([before.at(point), before.degree], [after.at(point), after.degree])
+            },
+            supports,
+        )?;
+        self.state.solutions += 1;
+        Ok(())
+    }
+
+    /// Nodes of the bed that have a displacement.
+    fn present_bed(&self, displacement: &[f64]) -> Vec<u32> {
+        let present = |&node: &u32| !displacement[3 * node as usize].is_nan();
+        self.settings.bed.iter().copied().filter(present).collect()
+    }
+
+    fn is_present(&self, element: usize) -> bool {
+        self.state.last.get(element).is_some_and(Option::is_some)
+    }
+
+    /// Displacements of the nodes, m, three a node; NaN where nothing bears stress.
+    pub fn displacement(&self) -> Vec<f64> {
+        let mut all = vec![f64::NAN; 3 * self.mesh.points.len()];
+        for element in (0..self.state.last.len()).filter(|&element| self.is_present(element)) {
+            for &node in self.mesh.nodes(element as u32) {
+                let node = node as usize;
+                all[3 * node..3 * node + 3].copy_from_slice(&self.body.state.displacement[node]);
+            }
+        }
+        all
+    }
+
+    /// Largest displacement of a node, m.
+    pub fn largest_displacement(&self) -> f64 {
+        let lengths = self.displacement();
+        let lengths = lengths.chunks(3).map(|u| u[0].hypot(u[1]).hypot(u[2]));
+        lengths.filter(|x| !x.is_nan()).fold(0.0, f64::max)
+    }
+
+    /// Mises stress of each element, Pa: the largest of its Gauss points; NaN where nothing bears stress.
+    pub fn mises(&self) -> Vec<f64> {
+        let largest = |element: usize| {
+            let points = 0..self.body.points(element);
+            let points = points.map(|point| von_mises(self.body.stress(element, point)));
+            if self.is_present(element) { points.fold(0.0, f64::max) } else { f64::NAN }
+        };
+        (0..self.mesh.element_count()).map(largest).collect()
+    }
+
+    /// Mean stress of each element, Pa, six each in VTK's order of symmetric tensors, xx, yy, zz, xy, yz, zx; NaN where
+    /// nothing bears stress.
+    pub fn stresses(&self) -> Vec<f64> {
+        let mean = |element: usize| match self.is_present(element) {
+            true => self.body.mean_stress(element),
+            false => [f64::NAN; 6],
+        };
+        (0..self.mesh.element_count()).flat_map(mean).collect()
+    }
+
+    /// Largest Mises stress of an element, Pa.
+    pub fn largest_mises(&self) -> f64 {
+        self.mises().into_iter().filter(|x| !x.is_nan()).fold(0.0, f64::max)
+    }
+
+    /// Largest Mises stress at the end of the print, before the release, Pa; 0 before [`Self::finish`].
+    pub fn mises_on_bed(&self) -> f64 {
+        self.state.mises_on_bed
+    }
+
+    /// Deviation of the bed side from flat, m: largest less smallest distance from its least-squares plane.
+    pub fn warpage(&self) -> f64 {
+        let moved = self.displacement();
+        let place = |&node: &u32| -> [f64; 3] {
+            std::array::from_fn(|d| self.mesh.points[node as usize][d] + moved[3 * node as usize + d])
+        };
+        let places = self.settings.bed.iter().map(place).filter(|place| place.iter().all(|x| x.is_finite()));
+        out_of_flatness(&places.collect::<Vec<_>>())
+    }
+
+    /// Largest rotation of an element since it was melt, rad.
+    pub fn largest_rotation(&self) -> f64 {
+        self.body.largest_rotation()
+    }
+
+    /// Energies of all solutions.
+    pub fn energy_balance(&self) -> &EnergyBalance {
+        &self.body.state.balance
+    }
+
+    /// Numbers of solutions and of iterations of conjugate gradients.
+    pub fn work(&self) -> [u64; 2] {
+        [self.state.solutions, self.body.state.iterations]
+    }
+
+    /// Returns the settings.
+    pub fn settings(&self) -> &StressSettings {
+        &self.settings
+    }
+}
+
+impl Thermal {
+    /// Mean T, K, and α.
+    fn mean(&self) -> [f64; 2] {
+        // corners of first order have equal shares
+        if self.count <= 8 {
+            return [self.nodes[..self.count].iter().sum::<f64>() / self.count as f64, self.degree];
+        }
+        let points = points(self.count);
+        [(0..points).map(|point| self.at(point)).sum::<f64>() / points as f64, self.degree]
+    }
+
+    /// T at a Gauss point, K.
+    fn at(&self, point: usize) -> f64 {
+        let shares = shares(self.count, point);
+        shares[..self.count].iter().zip(self.nodes).map(|(share, t)| share * t).sum()
+    }
+}

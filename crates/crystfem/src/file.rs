@@ -1,0 +1,27 @@
+//! Reading of files: their bytes, and errors at their lines.
+
+use crate::error::Error;
+use std::path::Path;
+
+/// Reads the bytes of a file.
+pub fn read_bytes(path: &Path) -> Result<Vec<u8>, Error> {
+    std::fs::read(path).map_err(|source| {
+        Error::Shared(polycore::Error::Io { operation: "read", path: path.to_owned(), source })
+    })
+}
+
+/// Error at a line of a file; long findings are cut.
+pub fn line_error(
+    path: &Path,
+    line: usize,
+    what: impl Into<String>,
+    found: impl ToString,
+    allowed: impl Into<String>,
+) -> Error {
+    let mut found = found.to_string();
+    if let Some((end, _)) = found.char_indices().nth(80) {
+        found.truncate(end);
+        found.push('…');
+    }
+    Error::File { path: path.to_owned(), line, what: what.into(), found, allowed: allowed.into() }
+}

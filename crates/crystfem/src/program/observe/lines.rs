@@ -1,0 +1,46 @@
+//! Temperature and fields along lines through a mesh, at the end of a run.
+
+use super::celsius::CELSIUS;
+use crate::error::Error;
+use crate::mesh::Place;
+use crate::program::scene::{PartScene, Task};
+use crate::simulation::Simulation;
+use harness::observe::{Observer, Outputs};
+
+/// The lines of a scene.
+pub struct Lines<'a> {
+    /// The scene.
+    pub scene: &'a PartScene,
+    /// Where the points of its lines are.
+    pub task: &'a Task,
+}
+
+impl Observer<Simulation, Error> for Lines<'_> {
+    /// Writes `line_NAME.csv` of every line: values by the shape functions of the element around each point, empty cells outside of
+    /// the elements that exist.
+    fn write(&self, simulation: &Simulation, to: &Outputs) -> Result<(), Error> {
+        let names = simulation.field_names();
+        for (line, places) in self.scene.output.line.iter().zip(&self.task.lines) {
+            let exists = |place: &&Place| place.elements().iter().any(|&element| simulation.is_born(element));
+            let along = |value: &dyn Fn(u32) -> Option<f64>| -> Vec<f64> {
+                let there = places.iter().map(|place| place.as_ref().filter(exists));
+                there.map(|place| place.and_then(|place| place.value(value)).unwrap_or(f64::NAN)).collect()
+            };
+            let mut columns = Vec::new();
+            if line.wants("temperature", true) {
+                let celsius = |node: u32| simulation.temperature(node).map(|kelvin| kelvin - CELSIUS);
+                columns.push(("temperature".to_owned(), "degC", along(&celsius)));
+            }
+            for name in names.iter().filter(|name| line.wants(name, true)) {
+                let field = simulation.field(name);
+                columns.push((
+                    (*name).to_owned(),
+                    "",
+                    along(&|node| field.get(node as usize).copied().flatten()),
+                ));
+            }
+            line.write::<3>(&to.folder.join(format!("line_{}.csv", line.name)), &columns)?;
+        }
+        Ok(())
+    }
+}

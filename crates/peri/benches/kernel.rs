@@ -1,0 +1,84 @@
+//! What force kernels are measured on; `cargo bench` takes it, too.
+
+use peri::Error;
+use peri::bonds::{Bonds, Lattice, LatticeBonds, VolumeCorrection};
+use peri::calibrate::{Space, modulus};
+use peri::field::{CHUNK, Field};
+use peri::geometry::{Operation, Shape, lattice};
+use peri::material::{Correspondence, EightChain, Material, NonlocalSolid, Response};
+use peri::potential::{KernelFit, Law};
+use polycore::constitutive::hyperelastic::{Compressible, NeoHookean, Volumetric};
+use polycore::constitutive::network::Activation::Softplus;
+use polycore::constitutive::surrogate::{Header, Kind, Surrogate, Symmetry};
+use rayon::prelude::*;
+
+/// Horizon over spacing of every measurement.
+pub const RATIO: f64 = 3.015;
+
+/// A square or cube of about so many particles.
+pub fn block<const D: usize>(particles: f64) -> Result<Lattice<D>, Error> {
+    let side = particles.powf(1.0 / D as f64).round();
+    let body = [Operation::Add(Shape::Box { min: [0.0; D], max: [side; D] })];
+    lattice(&body, 1.0, 1.0)
+}
+
+/// Its bonds.
+pub fn bonds<const D: usize>(lattice: Lattice<D>) -> Result<LatticeBonds<D>, Error> {
+    LatticeBonds::new(lattice, RATIO, VolumeCorrection::None, &[])
+}
+
+/// Gives bonds a law, fitted for these stretches, and a displacement for them to act on.
+pub fn loaded<const D: usize>(
+    bonds: &mut dyn Bonds<D>,
+    law: Law,
+    range: [f64; 2],
+) -> Result<(KernelFit, Field<D>), Error> {
+    let space = if D == 2 { Space::PlaneStress } else { Space::Solid };
+    let built = law.build(720.0, 1200.0, false)?;
+    let fit = KernelFit::new(&*built, range, 1e-9)?;
+    bonds.set_law(&fit, modulus(space, 1.0, bonds.horizon(), 1.0));
+    let mut displacement = Field::<D>::zeros(bonds.sites());
+    for &site in bonds.particles() {
+        let x = bonds.position(site as usize);
+        displacement.set(site as usize, std::array::from_fn(|d| 1e-3 * (0.37 * x[d]).sin()));
+    }
+    Ok((fit, displacement))
+}
+
+/// A material at work, and its name.
+pub type Named<const D: usize> = (&'static str, Box<dyn Response<D>>);
+
+/// Solids with two passes, by name: chains of 25 links, and by correspondence neo-Hookean rubber, K/μ = 100, and a learnt law, a
+/// network of 209 weights that are random: its speed does not depend on them.
+pub fn solids<const D: usize>(bonds: &dyn Bonds<D>) -> Result<[Named<D>; 3], Error> {
+    let space = if D == 2 { Space::PlaneStrain } else { Space::Solid };
+    let law =
+        NeoHookean::new(1.0).and_then(|law| Compressible::new(law, Volumetric::Ciarlet { lame: 100.0 }));
+    let law = law.map_err(|error| Error::geometry(error.to_string()))?;
+    let kind = Kind::polyconvex_energy(Symmetry::Isotropic);
+    let learnt = Surrogate::random(Header::new(kind, &[(16, Softplus), (8, Softplus)], 1), 1);
+    let learnt = learnt.map_err(|error| Error::geometry(error.to_string()))?;
+    let chains = NonlocalSolid(EightChain::new(space, 1.0, 25.0, 100.0)?).respond(bonds);
+    let neo_hookean = NonlocalSolid(Correspondence::new(law, space)?).respond(bonds);
+    let learnt = NonlocalSolid(Correspondence::new(learnt, space)?).respond(bonds);
+    Ok([
+        ("eight-chain", chains),
+        ("correspondence neo-hookean", neo_hookean),
+        ("correspondence learnt", learnt),
+    ])
+}
+
+/// States of all particles, and their forces.
+pub fn both_passes<const D: usize>(
+    solid: &mut dyn Response<D>,
+    bonds: &dyn Bonds<D>,
+    displacement: &Field<D>,
+    out: &mut Field<D>,
+) {
+    solid.prepare(bonds, displacement);
+    let solid = &*solid;
+    out.chunks_mut()
+        .into_par_iter()
+        .enumerate()
+        .for_each(|(chunk, mut force)| solid.force(bonds, displacement, chunk * CHUNK, &mut force, None));
+}

@@ -1,0 +1,185 @@
+//! Traits of a bonded body: its geometry, the forces of its bonds, and their damage.
+
+use super::lattice_sums::GradientSums;
+use super::{CloudBonds, LatticeBonds, Overstretched, Softened, Softening};
+use crate::field::{CHUNK, Field};
+use crate::potential::{EnergyTable, KernelFit, StretchRange, TangentTable};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// A neighbour J of a particle I, as set-up code sees it.
+#[derive(Clone, Copy, Debug)]
+pub struct Neighbour<const D: usize> {
+    /// Site of J.
+    pub site: usize,
+    /// Number of this bond among those of I, intact or not.
+    pub index: u32,
+    /// Reference bond ξ = X_J − X_I, m.
+    pub bond: [f64; D],
+    /// |ξ|, m.
+    pub length: f64,
+    /// Volume correction times V_J, m³ (without surface correction), of a softened bond times its integrity.
+    pub volume: f64,
+    /// All corrections: volume × surface factor.
+    pub weight: f64,
+    /// θ_J − θ_I of [`BodyGeometry::relief`], m; zero where there is none.
+    pub relief: [f64; D],
+}
+
+/// Particles of a body of dimension `D` and their families: the particles that intact bonds lead to.
+pub trait BodyGeometry<const D: usize>: Send + Sync {
+    /// Storage sites; fields have this length.
+    fn sites(&self) -> usize;
+    /// Sites that hold a particle, ascending.
+    fn particles(&self) -> &[u32];
+    /// Reference position of the particle in a site, m.
+    fn position(&self, site: usize) -> [f64; D];
+    /// Volume of the particle in a site, m³.
+    fn volume(&self, site: usize) -> f64;
+    /// Horizon δ, m.
+    fn horizon(&self) -> f64;
+    /// Distance of neighbouring particles (of a cloud: the cube or square root of the mean volume), m.
+    fn spacing(&self) -> f64;
+    /// Visits the intact bonds of a site.
+    fn neighbours(&self, site: usize, visit: &mut dyn FnMut(Neighbour<D>));
+    /// The intact bond of a site with a [`Neighbour::index`].
+    fn bond(&self, site: usize, index: u32) -> Neighbour<D>;
+    /// Whether an intact bond leads from a site to another.
+    fn is_bonded(&self, site: usize, other: usize) -> bool {
+        let mut bonded = false;
+        self.neighbours(site, &mut |bond| bonded |= bond.site == other);
+        bonded
+    }
+    /// Number of intact bonds of a site.
+    fn bonded(&self, site: usize) -> u32 {
+        let mut count = 0;
+        self.neighbours(site, &mut |_| count += 1);
+        count
+    }
+    /// Whether a site has no intact bond.
+    fn is_alone(&self, site: usize) -> bool {
+        self.bonded(site) == 0
+    }
+    /// Number of bonds of a whole family, where all such families are alike: of lattices.
+    fn whole_family(&self) -> Option<u32> {
+        None
+    }
+    /// Whether a family is whole and no bond of the body has a weight of its own: such families are alike in all sums over them.
+    fn has_whole_family(&self, site: usize) -> bool {
+        let _ = site;
+        false
+    }
+    /// θ, m, where it is set, see [`BondForces::set_relief`].
+    fn relief(&self) -> Option<&Field<D>> {
+        None
+    }
+    /// The sites of a bond that only the first of them has; `None` where every family is symmetric, as it must be.
+    fn one_sided(&self) -> Option<[usize; 2]> {
+        self.particles().par_iter().find_map_first(|&site| {
+            let mut lone = None;
+            self.neighbours(site as usize, &mut |bond| {
+                if lone.is_none() && !self.is_bonded(bond.site, site as usize) {
+                    lone = Some([site as usize, bond.site]);
+                }
+            });
+            lone
+        })
+    }
+}
+
+/// Kernels of bond laws. Whatever else acts along bonds is a [`crate::material::Material`].
+pub trait BondForces<const D: usize>: BodyGeometry<D> {
+    /// Sets the bond law q(e) and its modulus kθ, N/m⁶.
+    fn set_law(&mut self, fit: &KernelFit, modulus: f64);
+    /// Sets per-particle surface-correction factors (one field of `D` components over the sites).
+    fn set_factors(&mut self, factors: Field<D>);
+    /// Sets θ of solids of the mean deformation of a family, see [`crate::material::relief`]: before any bond breaks. Lattices have none.
+    fn set_relief(&mut self, relief: Field<D>) {
+        let _ = relief;
+    }
+    /// Copies a displacement before [`Self::force`] of it, where that reads a copy: in mixed precision ([`LatticeBonds::set_mixed`]), and
+    /// in clouds, where forces without a copy take longer. From the first call on, both give the forces of the displacement last copied.
+    fn prepare(&mut self, displacement: &Field<D>) {
+        let _ = displacement;
+    }
+    /// Force densities Σ_J f V_J, N/m³, of whole [`Self::piece`]s from the site `start` on; collects the stretches observed if
+    /// asked, of every bond in at least one of the work items that hold its ends.
+    fn force(
+        &self,
+        displacement: &Field<D>,
+        start: usize,
+        force: &mut [&mut [f64]; D],
+        track: Option<&mut StretchRange>,
+    );
+    /// Sites that [`Self::force`] may begin with: multiples of this, of which a work item is one. The bits of a force may depend on which
+    /// bonds the other sites of its piece have, and on no others.
+    fn piece(&self) -> usize {
+        CHUNK
+    }
+    /// Extremes of e = λ² − 1 over bonds with an end in work item `chunk`; those of all items together are those of the body.
+    fn stretches(&self, displacement: &Field<D>, chunk: usize) -> StretchRange;
+    /// The intact bonds with e > `least`, up to rounding, by site and [`Neighbour::index`]; for all sites together each once from both
+    /// of its ends: what some sites add, whole pieces of one work item.
+    fn suspects(&self, displacement: &Field<D>, sites: Range<usize>, least: f64) -> Vec<[u32; 2]>;
+    /// Σ_I V_I Σ_J w V_J |ξ| φ(e) over the body; `None` where bonds are to be visited one by one.
+    fn energy_sum(&self, displacement: &Field<D>, table: &EnergyTable) -> Option<f64> {
+        let _ = (displacement, table);
+        None
+    }
+    /// Σ_J (2 w V_J/|ξ|)·max(table(e), least)·(1 + max_{d≠e} |n_d n_e|) of each site of a work item, n the direction of the
+    /// deformed bond; `None` as [`Self::energy_sum`].
+    fn stiffness_sums(
+        &self,
+        displacement: &Field<D>,
+        chunk: usize,
+        table: &TangentTable,
+        least: f64,
+    ) -> Option<Vec<f64>> {
+        let _ = (displacement, chunk, table, least);
+        None
+    }
+    /// Σ share ξ⊗ξ/|ξ|² and Σ share η⊗ξ/|ξ|² over the intact bonds of each site of a work item; `None` as [`Self::energy_sum`].
+    fn gradient_sums(&self, displacement: &Field<D>, chunk: usize) -> Option<Vec<GradientSums<D>>> {
+        let _ = (displacement, chunk);
+        None
+    }
+}
+
+/// Damage of bonds.
+pub trait BondDamage<const D: usize>: BodyGeometry<D> {
+    /// Severs bonds, each named from both of its ends.
+    fn sever(&mut self, bonds: &[Overstretched]);
+    /// Damaged bonds (integrity below 1).
+    fn softening(&self) -> &Softening;
+    /// Takes these to be the softened bonds, each named from both of its ends: [`BodyGeometry::neighbours`] weighs them by their
+    /// integrity, [`BondForces::force`] does not.
+    fn soften(&mut self, bonds: Vec<Softened>);
+    /// Which bonds are intact, for checkpoints: as many words as [`Self::restore`] takes.
+    fn intact(&self) -> Vec<u64>;
+    /// Where [`Self::intact`] has the bond of a site with a [`Neighbour::index`]: word and bit.
+    fn bit(&self, site: usize, index: u32) -> (usize, u64);
+    /// Severs what is not intact in `words`; false where their number does not fit these bonds.
+    fn restore(&mut self, words: &[u64]) -> bool;
+    /// Intact bonds, each counted from both ends: the work of one force evaluation.
+    fn directed_bonds(&self) -> u64;
+}
+
+/// The two representations, for what only one of them has.
+pub enum Kind<'a, const D: usize> {
+    /// A regular lattice.
+    Lattice(&'a LatticeBonds<D>),
+    /// A cloud.
+    Cloud(&'a CloudBonds<D>),
+}
+
+/// The bonds of a body: its geometry, the kernels of bond laws, and damage.
+pub trait Bonds<const D: usize>: BondForces<D> + BondDamage<D> {
+    /// Bytes this representation holds for bonds and particles.
+    fn bytes(&self) -> usize;
+    /// Which representation this is.
+    fn kind(&self) -> Kind<'_, D>;
+    /// The lattice behind these bonds, if there is one.
+    fn as_lattice(&self) -> Option<&LatticeBonds<D>> {
+        if let Kind::Lattice(lattice) = self.kind() { Some(lattice) } else { None }
+    }
+}

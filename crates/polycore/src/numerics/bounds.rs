@@ -1,0 +1,27 @@
+//! Ends of numbers and boxes around points. NaN is passed over.
+
+/// The least and the greatest number; [∞, −∞] of none.
+pub fn range(numbers: impl IntoIterator<Item = f64>) -> [f64; 2] {
+    numbers.into_iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
+}
+
+/// The lower and the upper corner of the box around points.
+pub fn bounds<const D: usize>(points: impl IntoIterator<Item = [f64; D]>) -> [[f64; D]; 2] {
+    let (mut low, mut high) = ([f64::INFINITY; D], [f64::NEG_INFINITY; D]);
+    for point in points {
+        (0..D).for_each(|d| (low[d], high[d]) = (low[d].min(point[d]), high[d].max(point[d])));
+    }
+    [low, high]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ends() {
+        assert_eq!(range([2.0, f64::NAN, -3.0, 1.0]), [-3.0, 2.0]);
+        assert_eq!(range([]), [f64::INFINITY, f64::NEG_INFINITY]);
+        assert_eq!(bounds([[0.0, 5.0], [1.0, -2.0], [0.5, f64::NAN]]), [[0.0, -2.0], [1.0, 5.0]]);
+    }
+}

@@ -1,0 +1,59 @@
+//! Counting sort (Knuth, The Art of Computer Programming 3, 5.2).
+
+/// Items in numbered groups, in each group in the order in which they came; fewer than 2³² in all.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Groups<T> {
+    starts: Vec<u32>,
+    items: Vec<T>,
+}
+
+impl<T: Copy> Groups<T> {
+    /// Sorts pairs of a group below `count` and an item.
+    pub fn new(count: usize, pairs: impl Iterator<Item = (usize, T)> + Clone) -> Self {
+        let mut starts = vec![0; count + 1];
+        pairs.clone().for_each(|(group, _)| starts[group + 1] += 1);
+        (0..count).for_each(|group| starts[group + 1] += starts[group]);
+        let mut next = starts.clone();
+        let mut items: Vec<T> =
+            pairs.clone().next().map_or(Vec::new(), |(_, any)| vec![any; starts[count] as usize]);
+        for (group, item) in pairs {
+            items[next[group] as usize] = item;
+            next[group] += 1;
+        }
+        Self { starts, items }
+    }
+
+    /// Number of groups.
+    pub fn count(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    /// All items, group by group.
+    pub fn items(&self) -> &[T] {
+        &self.items
+    }
+
+    /// Items of a group.
+    pub fn of(&self, group: usize) -> &[T] {
+        self.between(group, group)
+    }
+
+    /// Items of groups that follow each other, from the first to the last.
+    pub fn between(&self, first: usize, last: usize) -> &[T] {
+        &self.items[self.starts[first] as usize..self.starts[last + 1] as usize]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers by their remainder.
+    #[test]
+    fn remainders() {
+        let groups = Groups::new(4, (0..10).map(|k| (k % 3, k)));
+        assert_eq!((groups.of(0), groups.of(2)), (&[0, 3, 6, 9][..], &[2, 5, 8][..]));
+        assert_eq!((groups.of(3).len(), groups.between(1, 3).len(), groups.count()), (0, 6, 4));
+        assert!(Groups::<u32>::new(0, std::iter::empty()).items().is_empty());
+    }
+}

@@ -1,0 +1,50 @@
+//! Disjoint sets (Tarjan 1975, doi:10.1145/321879.321884).
+
+/// Sets of the numbers 0 … n − 1, each at first alone. The least number of a set stands for it, whatever the order of unions.
+#[derive(Clone, Debug)]
+pub struct Sets(Vec<u32>);
+
+impl Sets {
+    /// So many numbers.
+    pub fn new(count: usize) -> Self {
+        Self((0..count as u32).collect())
+    }
+
+    /// The least number in the set of one.
+    pub fn root(&mut self, of: u32) -> u32 {
+        let (parent, mut at) = (&mut self.0, of);
+        while parent[at as usize] != at {
+            // halves the way for the next one
+            parent[at as usize] = parent[parent[at as usize] as usize];
+            at = parent[at as usize];
+        }
+        at
+    }
+
+    /// Joins the sets of two numbers; false where they were one.
+    pub fn join(&mut self, a: u32, b: u32) -> bool {
+        let (a, b) = (self.root(a), self.root(b));
+        self.0[a.max(b) as usize] = a.min(b);
+        a != b
+    }
+
+    /// Whether a number stands for its set.
+    pub fn is_root(&self, number: u32) -> bool {
+        self.0[number as usize] == number
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers that differ by 6 or by 10 are of one parity.
+    #[test]
+    fn parities() {
+        let mut sets = Sets::new(100);
+        let joined = (0..100).rev().flat_map(|k| [(k, k + 6), (k, k + 10)]).filter(|pair| pair.1 < 100);
+        let joins = joined.filter(|&(a, b)| sets.join(b, a)).count();
+        assert_eq!(joins, 98);
+        assert!((0..100).all(|k| sets.root(k) == k % 2 && sets.is_root(k) == (k < 2)));
+    }
+}
