@@ -18,11 +18,6 @@ pub trait Observer<S: ?Sized, E> {
     /// Names its fields and how each follows from a state.
     fn fields(&self, _to: &mut Fields<S>) {}
 
-    /// Counts of its work.
-    fn work(&self, _state: &S) -> Vec<(&'static str, u64)> {
-        Vec::new()
-    }
-
     /// Curves for the report, of the final state.
     fn curves(&self, _state: &S) -> Vec<Curve> {
         Vec::new()
@@ -30,6 +25,11 @@ pub trait Observer<S: ?Sized, E> {
 
     /// Sentences on what is allowed and most likely not meant, of the final state.
     fn warnings(&self, _state: &S) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// Counts of its work.
+    fn work(&self, _state: &S) -> Vec<(&'static str, u64)> {
         Vec::new()
     }
 
@@ -84,6 +84,15 @@ pub trait Observer<S: ?Sized, E> {
     }
 }
 
+/// A curve of a report.
+#[derive(Clone, Debug)]
+pub struct Curve {
+    /// Name.
+    pub name: String,
+    /// Columns: name, unit, values.
+    pub columns: Vec<(&'static str, &'static str, Vec<f64>)>,
+}
+
 /// Bytes of what an observer has seen, for [`Observer::save`].
 pub fn encode<T: Serialize>(seen: &T) -> Vec<u8> {
     // lists and numbers in memory: nothing that postcard refuses
@@ -100,15 +109,6 @@ pub fn decode<T: DeserializeOwned>(saved: &[u8]) -> Result<T, Error> {
         format: "checkpoint",
         reason: error.to_string(),
     })
-}
-
-/// A curve of a report.
-#[derive(Clone, Debug)]
-pub struct Curve {
-    /// Name.
-    pub name: String,
-    /// Columns: name, unit, values.
-    pub columns: Vec<(&'static str, &'static str, Vec<f64>)>,
 }
 
 /// Where the files of observers go.

@@ -1,6 +1,6 @@
 //! A wave in a bar of rubber whose end moves: where its front is, and how fast it runs.
 
-use peri::bonds::Bonds;
+use peri::bonds::BodyGeometry;
 use peri::calibrate::Calibration;
 use peri::geometry::Shape;
 use peri::model::{Body, Model, Rubber};

@@ -1,6 +1,6 @@
 //! A strip of points that form no lattice, pulled by hand: points, bonds, material, loads, solution.
 
-use peri::bonds::{Bonds, CloudBonds, VolumeCorrection};
+use peri::bonds::{BodyGeometry, CloudBonds, VolumeCorrection};
 use peri::calibrate::{Space, modulus};
 use peri::material::BondMaterial;
 use peri::potential::Law;

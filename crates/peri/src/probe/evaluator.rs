@@ -75,9 +75,10 @@ impl<const D: usize> StressEvaluator<D> {
             Kind::Nothing => {}
             Kind::Bonds { material, bound, clamped, last } => {
                 let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
-                if last.as_ref().is_none_or(|(stretches, _)| *stretches != state.fitted) {
-                    let fit = KernelFit::new(material.law(), state.fitted, *bound).ok();
-                    *last = fit.map(|fit| (state.fitted, if *clamped { fit.clamped() } else { fit }));
+                if last.as_ref().is_none_or(|(stretches, _)| *stretches != state.stretches.fitted) {
+                    let fit = KernelFit::new(material.law(), state.stretches.fitted, *bound).ok();
+                    *last =
+                        fit.map(|fit| (state.stretches.fitted, if *clamped { fit.clamped() } else { fit }));
                 }
                 // the solver has made the same fit
                 let Some((_, fit)) = &*last else { return };

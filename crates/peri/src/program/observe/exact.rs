@@ -8,10 +8,13 @@ use crate::program::scene::{ExactSpec, Scene};
 use crate::stress::Measure;
 use harness::observe::{Curve, Observer, Scalars};
 
+/// σ₁₁/σ∞ by each measure.
+type Normals = Vec<(Measure, Vec<f64>)>;
+
 /// Comparison with the closed form of a scene: peak and profile at θ = π/2, errors over regions.
 pub(super) struct Exact<'s> {
     scene: &'s Scene,
-    found: Option<(HoleComparison, Vec<(Measure, Vec<f64>)>)>,
+    found: Option<(HoleComparison, Normals)>,
 }
 
 impl<'s> Exact<'s> {

@@ -21,7 +21,7 @@ pub struct Frames {
 fn wanted<const D: usize>(every: usize, state: &State<D>, rows: usize) -> bool {
     let history = &state.history;
     let before = rows.checked_sub(2).map_or(0, |k| history[k].broken);
-    let prescribed = state.prescribed(rows).is_some_and(|steps| steps.is_multiple_of(every));
+    let prescribed = state.control.prescribed(rows).is_some_and(|steps| steps.is_multiple_of(every));
     rows > 0 && (prescribed || history[rows - 1].broken > before)
 }
 
@@ -42,7 +42,7 @@ fn frames_of<const D: usize>(every: usize, state: &State<D>) -> usize {
         let last = wanted(every, state, step + 1);
         in_between(state.history[step].rounds.saturating_sub(1)) + usize::from(last)
     };
-    (0..state.history.len()).map(of_step).sum::<usize>() + in_between(state.round)
+    (0..state.history.len()).map(of_step).sum::<usize>() + in_between(state.control.round)
 }
 
 /// A vector with zeros for what a plane body lacks.
@@ -109,10 +109,10 @@ impl Frames {
     /// Files that cannot be written.
     pub fn step<const D: usize>(&mut self, observers: &Observers<D>, m: &Moment<D>) -> Result<(), Error> {
         let (Some(every), state) = (m.scene.output.every, m.state) else { return Ok(()) };
-        if is_stage(state.round) {
-            let equilibrium = state.round as f64;
+        if is_stage(state.control.round) {
+            let equilibrium = state.control.round as f64;
             self.write(observers, m, state.step as f64 + equilibrium / (equilibrium + 1.0))?;
-        } else if state.round == 0 && wanted(every, state, state.history.len()) {
+        } else if state.control.round == 0 && wanted(every, state, state.history.len()) {
             self.write(observers, m, state.step as f64)?;
             self.written = Some(state.step);
         }

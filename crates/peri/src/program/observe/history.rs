@@ -84,12 +84,14 @@ fn breaking<const D: usize>(dynamic: bool, to: &mut Scalars<Moment<D>>) {
     if !dynamic {
         to.add_if(q::LOAD_OF_FIRST_EVENT, |m| {
             first(&m.state.history)?;
-            Some(m.state.events.first()?.load)
+            Some(m.state.fracture.events.first()?.load)
         });
     }
     last(to, q::BROKEN_BONDS, |row| row.broken as f64);
     if !dynamic {
-        to.add_if(q::BREAKING_EVENTS, |m| m.state.history.last().map(|_| m.state.events.len() as f64));
+        to.add_if(q::BREAKING_EVENTS, |m| {
+            m.state.history.last().map(|_| m.state.fracture.events.len() as f64)
+        });
     }
     last(to, q::DETACHED_PARTICLES, |row| row.detached as f64);
     last(to, q::LAST_LOAD, |row| row.load);

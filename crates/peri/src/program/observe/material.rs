@@ -95,7 +95,7 @@ impl<const D: usize> BodyWithMaterial<D> {
             Error::Parameter { name, found, allowed } => {
                 let unit = match name {
                     "critical.fracture_energy" => " J/m²",
-                    "critical.strength" => " Pa",
+                    "critical.strength" if spec.solid.is_some() => " Pa",
                     _ => "",
                 };
                 source.error(&format!("material.{name}"), scene::plain(found) + unit, allowed)

@@ -18,6 +18,9 @@ pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>
     }
 }
 
+/// Time and number of each row in which a probe saw something.
+type Seen = [(f64, f64)];
+
 /// The values of a probe; what was never seen has none.
 pub(super) fn of_probe<const D: usize>(probe: &Probe, column: usize, to: &mut Scalars<Moment<D>>) {
     let turns = probe.track == Track::Rotation;
@@ -26,11 +29,11 @@ pub(super) fn of_probe<const D: usize>(probe: &Probe, column: usize, to: &mut Sc
         let rows = all.filter(|(_, x)| x.is_finite()).collect();
         if turns { unwrapped(rows) } else { rows }
     };
-    let mut add = |quantity: Quantity, value: &dyn Fn(&[(f64, f64)]) -> Option<f64>| {
+    let mut add = |quantity: Quantity, value: &dyn Fn(&Seen) -> Option<f64>| {
         to.add_if(probe.named(quantity), |m| value(&rows(m)).filter(|value| value.is_finite()));
     };
-    let frequency = |rows: &[(f64, f64)]| first_swing(rows).map(|(_, time)| PI / time);
-    let peak = |rows: &[(f64, f64)]| {
+    let frequency = |rows: &Seen| first_swing(rows).map(|(_, time)| PI / time);
+    let peak = |rows: &Seen| {
         let swing = if turns { first_swing(rows) } else { None };
         let until = swing.map_or(rows.len(), |(end, _)| end);
         rows[..until].iter().map(|row| row.1).max_by(|a, b| a.abs().total_cmp(&b.abs()))
@@ -47,7 +50,7 @@ pub(super) fn of_probe<const D: usize>(probe: &Probe, column: usize, to: &mut Sc
             Some([from, to]) => Some((to - from) / (crossing(rows, to)? - crossing(rows, from)?)),
             None => rows.first().zip(rows.last()).map(|(a, b)| (b.1 - a.1) / (b.0 - a.0)),
         });
-        let between = |rows: &[(f64, f64)]| -> Option<Vec<f64>> {
+        let between = |rows: &Seen| -> Option<Vec<f64>> {
             let [from, to] = gauges?;
             Some(rows.iter().map(|row| row.1).filter(|x| (from..=to).contains(x)).collect())
         };

@@ -16,7 +16,7 @@ use std::path::Path;
 /// Files that cannot be read or written.
 pub fn stages<const D: usize>(m: &Moment<D>, output: &Path) -> Result<(), Error> {
     let (cracks, spacing, history) = (m.damage_of_cracks(), m.bonds.spacing(), &m.state.history);
-    let frames = vtkhdf::read(&output.join(m.physics.field_file()))?;
+    let frames = vtkhdf::read(output.join(m.physics.field_file()))?;
     let damages: Vec<f64> = (0..frames.len())
         .map(|k| Ok(since(frames.data(k, "damage")?.iter().sum(), cracks)))
         .collect::<Result<_, Error>>()?;

@@ -35,8 +35,8 @@ pub(super) fn followed<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>
 pub(super) fn stretches<const D: usize>(_: &Scene, to: &mut Scalars<Moment<D>>) {
     to.add(q::SMALLEST_STRETCH, |m| m.each(|row| row.smallest_stretch).fold(1.0, f64::min));
     to.add(q::LARGEST_STRETCH, |m| m.each(|row| row.largest_stretch).fold(1.0, f64::max));
-    to.add(q::SMALLEST_STRETCH_MET, |m| (1.0 + m.state.observed.low).max(0.0).sqrt());
-    to.add(q::LARGEST_STRETCH_MET, |m| (1.0 + m.state.observed.high).sqrt());
+    to.add(q::SMALLEST_STRETCH_MET, |m| (1.0 + m.state.stretches.observed.low).max(0.0).sqrt());
+    to.add(q::LARGEST_STRETCH_MET, |m| (1.0 + m.state.stretches.observed.high).sqrt());
 }
 
 /// Error of the fitted bond law.
@@ -76,9 +76,11 @@ pub(super) fn motion<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>)
     if scene.dynamics.is_none() {
         return;
     }
-    to.add_if(q::CRITICAL_TIME_STEP, |m| Some(m.state.motion.critical_step).filter(|step| step.is_finite()));
-    to.add(q::TIME_STEP, |m| m.state.motion.time_step);
-    to.add(q::KINETIC_ENERGY, |m| m.state.motion.kinetic);
+    to.add_if(q::CRITICAL_TIME_STEP, |m| {
+        Some(m.state.motion.limits.critical_step).filter(|step| step.is_finite())
+    });
+    to.add(q::TIME_STEP, |m| m.state.motion.steps.time_step);
+    to.add(q::KINETIC_ENERGY, |m| m.state.motion.energies.kinetic);
     if scene.is_mixed() {
         to.add_if(q::MIXED_ERROR, mixed_error);
     }
