@@ -46,10 +46,10 @@ fn bodies_of_peri() {
         use peri::program::scene::{Scene, check, least_memory};
         let scene = source.parse::<Scene>().map_err(|error| error.render())?;
         for variant in check(source, &scene, false).map_err(|error| error.render())? {
-            let (source, scene) = variant.resolve(source, &scene).map_err(|error| error.render())?;
+            let (source, scene) = variant.resolved();
             let least = match scene.body.space {
-                Space::Solid => least_memory::<3>(&source, &scene, &variant),
-                _ => least_memory::<2>(&source, &scene, &variant),
+                Space::Solid => least_memory::<3>(source, scene, &variant),
+                _ => least_memory::<2>(source, scene, &variant),
             };
             if least.map_err(|error| error.render())? > LARGEST {
                 return Ok(());
