@@ -22,6 +22,7 @@ mod parts;
 mod placement;
 mod planes;
 mod probe;
+mod region;
 mod rotation;
 mod solid;
 mod tearing;

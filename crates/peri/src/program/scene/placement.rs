@@ -1,6 +1,6 @@
 //! What a scene names beside its body must lie where the body is: a closed form's hole, displacements of the loads.
 
-use super::loads::layers;
+use super::region::layers;
 use super::values::Body;
 use super::{ExactSpec, Scene, Side};
 use crate::exact::Plate;

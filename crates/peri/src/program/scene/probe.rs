@@ -1,7 +1,7 @@
 //! Quantities that a scene records in every row of the history: displacements, strains between marks, rotations, crack tips, wave
 //! fronts, J-integrals.
 
-use super::loads::region;
+use super::region::region;
 use super::values::{Body, vector};
 use super::{Axis, Boundary, Method, Scene, Side};
 use crate::calibrate::Space;

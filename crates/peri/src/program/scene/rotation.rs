@@ -1,7 +1,7 @@
 //! Boundaries that turn about an axis, and fields of displacements that would cut across the arc.
 
 use super::boundary::RotationSpec;
-use super::loads::region;
+use super::region::region;
 use super::values::{Body, plain, vector};
 use super::{Boundary, Prescribed, PrescribedField, Scene};
 use crate::bonds::Bonds;

@@ -1,0 +1,102 @@
+//! Particles that a boundary acts on.
+
+use super::Boundary;
+use super::build::operations;
+use super::values::{Body, ordered, vector};
+use crate::bonds::Bonds;
+use crate::geometry::inside;
+use harness::scene::{SceneError, Source};
+
+/// Layers of particles at a side that a boundary acts on.
+pub(super) fn layers<const D: usize>(boundary: &Boundary, bonds: &dyn Bonds<D>) -> usize {
+    boundary.layers_of(bonds.spacing(), bonds.horizon() / bonds.spacing())
+}
+
+/// Particles of the region of a boundary, and its depth at a side, m.
+pub(super) fn region<const D: usize>(
+    source: &Source,
+    key: &str,
+    boundary: &Boundary,
+    body: &Body<D>,
+) -> Result<(Vec<u32>, Option<f64>), SceneError> {
+    let spacing = body.bonds.spacing();
+    let (low, high, depth) = match (boundary.side, &boundary.min, &boundary.max) {
+        (Some(side), None, None) if boundary.shapes.is_empty() => {
+            let (axis, upper) = side.axis();
+            if axis >= D {
+                return Err(source.error(
+                    &format!("{key}.side"),
+                    side,
+                    "a side along x or y of a plane body",
+                ));
+            }
+            let name = boundary.depth_key().unwrap_or("layers");
+            if boundary.depth.is_some() && boundary.layers.is_some() {
+                return Err(source.error(
+                    &format!("{key}.depth"),
+                    "`depth` together with `layers`",
+                    "one of them",
+                ));
+            }
+            if boundary.layers == Some(0) {
+                return Err(source.error(&format!("{key}.layers"), 0, "at least 1"));
+            }
+            let layers = layers(boundary, &*body.bonds);
+            // particles of a lattice fill whole layers
+            let depth = match boundary.depth {
+                Some(depth) if body.bonds.as_lattice().is_none() => depth.si(),
+                _ => layers as f64 * spacing,
+            };
+            if depth <= 0.0 || boundary.depth.is_some_and(|depth| depth.si() <= 0.0) {
+                let found = format!("{} m", boundary.depth.map_or(0.0, |depth| depth.si()));
+                let allowed = format!("at least half a spacing, {} m: it holds no particle", 0.5 * spacing);
+                return Err(source.error(&format!("{key}.depth"), found, allowed));
+            }
+            let extent = body.bounds.1[axis] - body.bounds.0[axis];
+            if depth > extent * (1.0 + 1e-9) {
+                let found = format!("{layers} layers, {depth} m deep");
+                return Err(source.error(
+                    &format!("{key}.{name}"),
+                    found,
+                    format!("at most the body, {extent} m"),
+                ));
+            }
+            let (mut low, mut high) = ([f64::NEG_INFINITY; D], [f64::INFINITY; D]);
+            if upper {
+                low[axis] = body.bounds.1[axis] - depth;
+            } else {
+                high[axis] = body.bounds.0[axis] + depth;
+            }
+            (low, high, Some(depth))
+        }
+        (None, Some(min), Some(max)) if boundary.shapes.is_empty() => {
+            if let Some(name) = boundary.depth_key() {
+                return Err(source.error(
+                    &format!("{key}.{name}"),
+                    format!("`{name}`"),
+                    "nothing: the box has its own depth",
+                ));
+            }
+            let (min, max) =
+                (vector(source, &format!("{key}.min"), min)?, vector(source, &format!("{key}.max"), max)?);
+            ordered(source, key, min, max)?;
+            (min, max, None)
+        }
+        (None, None, None) if !boundary.shapes.is_empty() && boundary.depth_key().is_none() => {
+            ([f64::NEG_INFINITY; D], [f64::INFINITY; D], None)
+        }
+        (side, min, max) => {
+            let given = [side.is_some(), min.is_some() || max.is_some(), !boundary.shapes.is_empty()];
+            let several = given.iter().filter(|given| **given).count() > 1;
+            let found = if several { "several kinds of region" } else { "no region" };
+            return Err(source.error(key, found, "one of `side`, `shapes`, or `min` and `max`"));
+        }
+    };
+    let shapes = operations(source, &format!("{key}.shapes"), &boundary.shapes)?;
+    let inside = |&site: &u32| {
+        let position = body.bonds.position(site as usize);
+        let boxed = (0..D).all(|d| low[d] <= position[d] && position[d] <= high[d]);
+        boxed && (shapes.is_empty() || inside(&shapes, position))
+    };
+    Ok((body.bonds.particles().iter().copied().filter(inside).collect(), depth))
+}
