@@ -120,6 +120,7 @@ fn plainly(error: &io::Error) -> &'static str {
 }
 
 /// Whether a file could not be written because there is no more room for it, which is no fault of the input.
+#[cfg(feature = "files")]
 pub(crate) fn no_room(error: &io::Error) -> bool {
     !plainly(error).is_empty()
 }

@@ -167,8 +167,10 @@ fn unequal_cells_need_little_more_than_equal_ones() {
     let storage = |fills: u16| {
         let (count, layers, piece, width) = (24, 12, 12, 2);
         let mesh = grid([12e-3, 12e-3, 6e-3], [count, count, layers]);
+        // one material for all parts, which then share its points
+        let whole = pa12(None);
         let filled =
-            |k| Arc::new(Filled::new(pa12(None), 0.5 + 0.5 * f64::from(k) / f64::from(fills)).unwrap());
+            |k| Arc::new(Filled::new(whole.clone(), 0.5 + 0.5 * f64::from(k) / f64::from(fills)).unwrap());
         let mut births = Vec::new();
         for (layer, line) in (0..layers).flat_map(|layer| (0..count / width).map(move |line| (layer, line))) {
             for along in [0..piece, piece..count] {
