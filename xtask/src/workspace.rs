@@ -91,7 +91,7 @@ impl Workspace {
         let text = String::from_utf8_lossy(&output.stdout);
         let messages = text.lines().filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok());
         let executable =
-            messages.filter_map(|message| Some(PathBuf::from(message["executable"].as_str()?))).last();
+            messages.filter_map(|message| Some(PathBuf::from(message["executable"].as_str()?))).next_back();
         executable
             .filter(|_| output.status.success())
             .ok_or_else(|| miette!("the bench of {package} was not built"))

@@ -15,7 +15,7 @@ use std::sync::Arc;
 enum Order {
     Layers(Layers),
     /// A path, the time of each element on it, s, filled parts, and which of them each element has.
-    Path(ToolPath, Vec<f64>, (Vec<f64>, Vec<usize>)),
+    Path(Box<ToolPath>, Vec<f64>, (Vec<f64>, Vec<usize>)),
 }
 
 /// A part that is printed layer by layer or along a tool path.
@@ -50,7 +50,7 @@ impl PrintedPart {
     ) -> Result<Self, Error> {
         let deposit = path.deposit(cells)?;
         let fill = deposit.voxels.bins();
-        Ok(Self::ordered(deposit.voxels.mesh, Order::Path(path, deposit.times, fill), material))
+        Ok(Self::ordered(deposit.voxels.mesh, Order::Path(Box::new(path), deposit.times, fill), material))
     }
 
     fn ordered(mesh: Mesh, order: Order, material: impl ThermalMaterial + 'static) -> Self {

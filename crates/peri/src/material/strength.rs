@@ -3,6 +3,7 @@
 use super::point_law::{Deformation, PointLaw};
 use super::tensor::Tensor;
 use polycore::numerics::bisect;
+use std::cmp::Ordering;
 
 /// No solid is strained farther.
 const GREATEST: f64 = 1e3;
@@ -17,7 +18,7 @@ fn pulled<const D: usize>(law: &(impl PointLaw<D> + ?Sized), stretch: f64) -> (D
         (deformation, piola)
     };
     // a body without volume is outside of most laws
-    at(bisect(0.0, 2.0, 60, |side| !(at(side).1[(1, 1)] > 0.0))[1])
+    at(bisect(0.0, 2.0, 60, |side| at(side).1[(1, 1)].partial_cmp(&0.0) != Some(Ordering::Greater))[1])
 }
 
 /// Energy density W, J/m³, of the uniform state of uniaxial tension in which the stress is first `strength`, Pa: force over the

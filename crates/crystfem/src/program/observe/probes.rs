@@ -195,7 +195,8 @@ impl Observer<Simulation, Error> for Probes<'_> {
     }
 
     fn restore(&mut self, saved: &[u8]) -> Result<(), Error> {
-        Ok(self.probes = harness::observe::decode(saved)?)
+        self.probes = harness::observe::decode(saved)?;
+        Ok(())
     }
 }
 
