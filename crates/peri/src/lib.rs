@@ -1,7 +1,7 @@
 //! Bond-based peridynamics of elastomers: chain-network bond laws, lattices without neighbour lists and clouds with
 //! them, adaptive dynamic relaxation, Hardy stress.
 //!
-//! The `peri` command line solves problems written as scenes ([`scene`], feature `case`); the same from Rust:
+//! The `peri` command line solves problems written as scenes (`program::scene`, feature `case`); the same from Rust:
 //!
 //! ```
 //! use peri::geometry::Shape;

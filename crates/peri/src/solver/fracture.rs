@@ -13,7 +13,7 @@ pub struct Event {
     pub bonds: u64,
     /// Which ones, as a number: two sets of bonds of one body that differ have different ones.
     pub fingerprint: u64,
-    /// Load of the equilibrium before, N, see [`Record::load`]; 0 in dynamics.
+    /// Load of the equilibrium before, N, see [`Record::load`](super::Record::load); 0 in dynamics.
     pub load: f64,
 }
 

@@ -12,7 +12,7 @@ use crate::error::Error;
 /// A method that finds the equilibrium of a state at the load factor of its step.
 pub trait Equilibrium<const D: usize> {
     /// Moves the free components until the forces balance; leaves the force of the final displacement in
-    /// [`State::force`], counts iterations in [`State::iteration`] (reset by the caller) and the others. The stretches of that
+    /// [`State::force`], counts iterations in [`Counts::iteration`](super::Counts) (reset by the caller) and the others. The stretches of that
     /// displacement, where it has looked at them.
     ///
     /// # Errors
@@ -50,7 +50,7 @@ impl<const D: usize, M: QuasiStatic<D>> Method<D> for M {
     }
 }
 
-/// Solves the remaining load steps of `state`; `finished` sees every finished step and, with [`State::round`] above 0,
+/// Solves the remaining load steps of `state`; `finished` sees every finished step and, with [`StepControl::round`](super::StepControl) above 0,
 /// every equilibrium in which bonds have just broken.
 ///
 /// # Errors

@@ -31,7 +31,7 @@ pub fn check(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<Variant>
     Ok(variants)
 }
 
-/// Checks the scene of one variant, see [`Variant::resolve`].
+/// Checks the scene of one variant, see [`Variant::resolved`].
 ///
 /// # Errors
 /// As [`check`].
