@@ -313,7 +313,6 @@ impl Rows {
     }
 
     /// Bytes of what is stored.
-    #[cfg(feature = "case")]
     pub fn bytes(&self) -> usize {
         let segments: usize = self.segments.iter().map(Vec::len).sum();
         segments * size_of::<Segment>() + self.own.len() * size_of::<Stencil>() + self.stencils.bytes()

@@ -141,7 +141,6 @@ impl Stencils {
     }
 
     /// Bytes of all lists.
-    #[cfg(feature = "case")]
     pub(super) fn bytes(&self) -> usize {
         // start, rows, hash and name; place of the diagonal and threes
         const LIST: usize = 4 + 4 + 16;
