@@ -111,7 +111,8 @@ impl Workspace {
     pub fn programs(&self) -> Vec<String> {
         let entries = std::fs::read_dir(self.root.join("crates")).into_iter().flatten().flatten();
         let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
-        let mut names: Vec<String> = names.filter(|name| self.package(name).is_some()).collect();
+        let mut names: Vec<String> =
+            names.filter(|name| !name.ends_with("-cli") && self.package(name).is_some()).collect();
         names.sort();
         names
     }
