@@ -33,11 +33,6 @@ pub trait Observer<S: ?Sized, E> {
         Vec::new()
     }
 
-    /// Memory that it keeps during the run, bytes.
-    fn memory(&self) -> f64 {
-        0.0
-    }
-
     /// Sees the initial state and every accepted step.
     ///
     /// # Errors
@@ -95,7 +90,7 @@ pub struct Curve {
 
 /// Bytes of what an observer has seen, for [`Observer::save`].
 pub fn encode<T: Serialize>(seen: &T) -> Vec<u8> {
-    // lists and numbers in memory: nothing that postcard refuses
+    // lists and numbers in memory: nothing that postcard refuses; `decode` refuses bytes that are missing
     postcard::to_stdvec(seen).unwrap_or_default()
 }
 
@@ -231,11 +226,6 @@ impl<S: ?Sized, E> Observers<'_, S, E> {
         let mut fields = Fields::new(Some(state));
         self.0.iter().for_each(|observer| observer.fields(&mut fields));
         fields.each
-    }
-
-    /// Memory of all, bytes.
-    pub fn memory(&self) -> f64 {
-        self.0.iter().map(|observer| observer.memory()).sum()
     }
 
     /// Shows an accepted step to all.

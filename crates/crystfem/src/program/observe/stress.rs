@@ -97,9 +97,7 @@ impl<'a> Observer<Simulation, Error> for Stress<'a> {
     }
 
     fn restore(&mut self, saved: &[u8]) -> Result<(), Error> {
-        if !saved.is_empty() {
-            self.coupling()?.restore(harness::observe::decode(saved)?);
-        }
+        self.coupling()?.restore(harness::observe::decode(saved)?);
         Ok(())
     }
 }
