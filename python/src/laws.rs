@@ -5,7 +5,7 @@ use crate::pool;
 use crate::watch::stoppable;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use polycore::constitutive::Error;
-use polycore::constitutive::hyperelastic::data::{Mode, State, Table};
+use polycore::constitutive::hyperelastic::data::{Mode, TestData, TestState};
 use polycore::constitutive::hyperelastic::{
     self, Compressible, Coupling, Hyperelastic, MODELS, Volumetric, fit, homogeneous,
 };
@@ -222,9 +222,9 @@ pub fn fit_law<'py>(
         for row in rows.as_array().rows() {
             let state = match (mode, row.as_slice()) {
                 (Mode::Biaxial, Some(&[first, second, p, q])) => {
-                    State { mode, stretches: [first, second], nominal: [p, q] }
+                    TestState { mode, stretches: [first, second], nominal: [p, q] }
                 }
-                (_, Some(&[stretch, nominal])) if mode != Mode::Biaxial => State {
+                (_, Some(&[stretch, nominal])) if mode != Mode::Biaxial => TestState {
                     mode,
                     stretches: [stretch, mode.second_stretch(stretch)],
                     nominal: [nominal, 0.0],
@@ -240,7 +240,7 @@ pub fn fit_law<'py>(
             states.push(state);
         }
     }
-    let table = Table { source: String::new(), states };
+    let table = TestData { source: String::new(), states };
     let model = hyperelastic::model(key).map_err(value)?;
     let found = stoppable(py, |stop| fit::fit_until(model, &table, &|| stop.load(Ordering::Relaxed)))?;
     let found = found.map_err(value)?;

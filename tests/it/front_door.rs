@@ -315,7 +315,7 @@ fn tables() {
     });
     let rubber = below("cases/ch1", ".csv");
     attack_files("rubber data", &rubber, "rubber.csv", |path| {
-        polycore::constitutive::hyperelastic::data::Table::read(path)
+        polycore::constitutive::hyperelastic::data::TestData::read(path)
             .map(|_| ())
             .map_err(|error| error.to_string())
     });

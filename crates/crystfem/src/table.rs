@@ -126,7 +126,7 @@ pub fn understood(path: &Path) -> Option<String> {
     let table = Table::read(path).ok()?;
     let used: Vec<usize> = NAMES.iter().flat_map(|(_, names)| table.matching(names)).collect();
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    (!used.is_empty()).then(|| format!("data {name}: {}", table.understood(&used)))
+    (!used.is_empty()).then(|| format!("data {name}: {}", table.describe(&used)))
 }
 
 impl From<table::Error> for Error {

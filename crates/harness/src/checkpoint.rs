@@ -109,7 +109,7 @@ pub fn read<T: DeserializeOwned>(path: &Path, magic: &Magic) -> Result<T, Error>
         Err(error) if [ErrorKind::NotFound, ErrorKind::NotADirectory].contains(&error.kind()) => {
             return Err(refused(path, "there is none; start a run with `run`"));
         }
-        Err(error) => return Err(Error::io("read", path)(error)),
+        Err(error) => return Err(Error::from_io("read", path)(error)),
     };
     let Some((sum, rest)) = bytes.strip_prefix(magic).and_then(|rest| rest.split_first_chunk()) else {
         return Err(refused(path, foreign(&bytes, magic)));

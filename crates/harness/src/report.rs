@@ -204,7 +204,7 @@ impl Report {
     /// [`Error::Io`], or [`Error::Format`] if it is not a report.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, Error> {
         let path = path.as_ref();
-        let text = std::fs::read_to_string(path).map_err(Error::io("read", path))?;
+        let text = std::fs::read_to_string(path).map_err(Error::from_io("read", path))?;
         serde_json::from_str(&text).map_err(|error| Error::Format {
             path: path.to_path_buf(),
             format: "report",

@@ -3,7 +3,7 @@
 use evidence::measurement::Measurement;
 use mdsurrogate::Error;
 use mdsurrogate::dataset::Row;
-use mdsurrogate::kinematics::cauchy_of_material;
+use mdsurrogate::kinematics::cauchy_from_material;
 use mdsurrogate::network::Architecture;
 use mdsurrogate::random::SplitMix64;
 use mdsurrogate::surrogate::Kind;
@@ -25,7 +25,7 @@ pub fn measure() -> Result<Vec<Measurement>, Error> {
         let f = Tensor::from_diagonal(&[stretch(), stretch(), stretch()].into());
         let f = DeformationGradient::new(f)?;
         let s = Voigt::from_fn(|a, _| 1e9 * ((a + 1) as f64 * f.matrix()[(a % 3, a % 3)]).sin());
-        rows.push(Row::new(sample as u64, f64::NAN, f, cauchy_of_material(&f, &s)));
+        rows.push(Row::new(sample as u64, f64::NAN, f, cauchy_from_material(&f, &s)));
     }
     let rows: Vec<&Row> = rows.iter().collect();
     let header = mdsurrogate::fitted::header(Kind::Ann, Architecture::thesis(4)?, 1, &rows, true)?;

@@ -34,7 +34,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         states[0].best_loss()
     );
 
-    let found = Deviations::of(&model, &deformations()[..3])?;
+    let found = Deviations::measure(&model, &deformations()[..3])?;
     println!(
         "tangent against differences {:.1e}, stress at rest {:.1e}",
         found.tangent, found.stress_at_rest

@@ -102,8 +102,8 @@ pub enum Error {
 
 impl Error {
     /// For `map_err` on file operations.
-    pub fn io(operation: &'static str, path: impl AsRef<Path>) -> impl FnOnce(std::io::Error) -> Self {
-        let error = polycore::Error::io(operation, path);
+    pub fn from_io(operation: &'static str, path: impl AsRef<Path>) -> impl FnOnce(std::io::Error) -> Self {
+        let error = polycore::Error::from_io(operation, path);
         move |source| Self::Shared(error(source))
     }
 

@@ -76,7 +76,7 @@ pub fn header(
             *deviation = deviation.max(LEAST_DEVIATION * square.sqrt());
         }
     }
-    header.support = Some(Support::of(&known, REPRESENTATIVES)?);
+    header.support = Some(Support::from_rows(&known, REPRESENTATIVES)?);
     match header.kind {
         Kind::Ann if standardised => {
             for (a, [mean, deviation]) in of_stress.into_iter().enumerate() {

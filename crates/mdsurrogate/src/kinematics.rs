@@ -6,7 +6,7 @@
 use crate::Error;
 use polycore::tensor::{DeformationGradient, StressMeasure, Tensor, Voigt, voigt};
 
-pub use polycore::tensor::voigt::{NAMES, cauchy_of_material, jaumann_tangent};
+pub use polycore::tensor::voigt::{NAMES, cauchy_from_material, jaumann_tangent};
 
 /// One standard atmosphere, Pa (exact by definition; LAMMPS' `units real` measure pressure in it).
 pub const ATMOSPHERE: f64 = 101_325.0;
@@ -152,7 +152,7 @@ mod tests {
         let cauchy = Voigt::new(3.0, 2.0, -4.0, -1.0, 0.5, 0.7);
         let (c, s) = material_pair(&f, &cauchy);
         // three products with a matrix of condition 3
-        assert!((cauchy_of_material(&f, &s) - cauchy).amax() < 2e-14);
+        assert!((cauchy_from_material(&f, &s) - cauchy).amax() < 2e-14);
         let u = stretch_of(&c).unwrap();
         assert!((voigt::from_stress(&u.right_cauchy_green()) - c).amax() < 1e-14);
         assert!((u.matrix() - u.matrix().transpose()).amax() < 1e-15);

@@ -237,7 +237,7 @@ fn exact_tables_read_back_as_data() {
     let result = polycore(&arguments);
     assert_eq!(result.status.code(), Some(0), "{}", text(&result.stderr));
     let table =
-        polycore::constitutive::hyperelastic::data::Table::parse("exact", &text(&result.stdout)).unwrap();
+        polycore::constitutive::hyperelastic::data::TestData::parse("exact", &text(&result.stdout)).unwrap();
     assert_eq!(table.measurements(), 2);
     assert!((table.states[0].nominal[0] - 0.875e6).abs() < 1e-6);
     for bad in [

@@ -126,8 +126,8 @@ pub(crate) fn no_room(error: &io::Error) -> bool {
 }
 
 impl Error {
-    /// For `map_err`: `fs::rename(a, b).map_err(Error::io("rename", b))`.
-    pub fn io(operation: &'static str, path: impl AsRef<Path>) -> impl FnOnce(io::Error) -> Self {
+    /// For `map_err`: `fs::rename(a, b).map_err(Error::from_io("rename", b))`.
+    pub fn from_io(operation: &'static str, path: impl AsRef<Path>) -> impl FnOnce(io::Error) -> Self {
         let path = path.as_ref().to_path_buf();
         move |source| Self::Io { operation, path, source }
     }
@@ -160,9 +160,9 @@ mod tests {
 
     #[test]
     fn a_full_disk_in_plain_words() {
-        let full = Error::io("write", "a.csv")(io::ErrorKind::StorageFull.into());
+        let full = Error::from_io("write", "a.csv")(io::ErrorKind::StorageFull.into());
         assert!(full.to_string().starts_with("cannot write a.csv: the disk is full: "), "{full}");
         assert_eq!(full.exit_code(), 1);
-        assert_eq!(Error::io("read", "a.csv")(io::ErrorKind::NotFound.into()).exit_code(), 2);
+        assert_eq!(Error::from_io("read", "a.csv")(io::ErrorKind::NotFound.into()).exit_code(), 2);
     }
 }

@@ -23,12 +23,12 @@ pub fn atomic_write(
         .suffix(".part")
         .permissions_of_a_new_file()
         .tempfile_in(directory)
-        .map_err(Error::io("create a file in", directory))?;
+        .map_err(Error::from_io("create a file in", directory))?;
     let mut buffer = BufWriter::new(temporary.as_file_mut());
-    write(&mut buffer).and_then(|()| buffer.flush()).map_err(Error::io("write", path))?;
+    write(&mut buffer).and_then(|()| buffer.flush()).map_err(Error::from_io("write", path))?;
     drop(buffer);
-    temporary.as_file().sync_all().map_err(Error::io("synchronise", path))?;
-    temporary.persist(path).map_err(|error| Error::io("write", path)(error.error))?;
+    temporary.as_file().sync_all().map_err(Error::from_io("synchronise", path))?;
+    temporary.persist(path).map_err(|error| Error::from_io("write", path)(error.error))?;
     sync_directory(directory);
     Ok(())
 }
@@ -51,7 +51,7 @@ pub fn prepare_directory(directory: impl AsRef<Path>) -> Result<(), Error> {
     // permissions do not tell everything (read-only mounts, quotas): try
     let probe = tempfile::tempfile_in(directory).and_then(|mut probe| probe.write_all(b"probe"));
     probe.map_err(|error| match crate::error::no_room(&error) {
-        true => Error::io("write into", directory)(error),
+        true => Error::from_io("write into", directory)(error),
         false => fail(error.to_string()),
     })
 }

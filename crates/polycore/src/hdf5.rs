@@ -79,7 +79,7 @@ pub fn write_error(path: &Path, error: Hdf5Error) -> Error {
             }
         }
     };
-    Error::io("write", path)(told)
+    Error::from_io("write", path)(told)
 }
 
 #[cfg(test)]

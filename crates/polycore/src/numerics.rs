@@ -16,7 +16,7 @@ pub use bounds::{bounds, range};
 #[cfg(feature = "solvers")]
 pub use conjugate_gradients::conjugate_gradients;
 pub use groups::Groups;
-pub use sets::Sets;
+pub use sets::DisjointSets;
 
 /// Sum of the values of work items in their order, whatever thread computes them.
 #[cfg(feature = "solvers")]

@@ -3,7 +3,7 @@
 //! [`Table::read`] finds out by itself how a file is written: its encoding (UTF-8, UTF-16, Latin-1), separator (tab, `;`,
 //! `,`, blanks), decimal sign, the line of headings below any lines of metadata, and a row of units. Headings are
 //! `name [unit]`, `name (unit)`, `name/unit` or `name` over a unit. What was found is said in one line
-//! ([`Table::understood`]), and stands in every error.
+//! ([`Table::describe`]), and stands in every error.
 //!
 //! ```
 //! use polycore::table::Table;
@@ -11,11 +11,11 @@
 //!
 //! let text = "Operator;Smith\nTime (min);Stress\n;MPa\n0,5;1,25\n1,0;2,5\n";
 //! let table = Table::parse("tests.csv", text.as_bytes().to_vec())?;
-//! let [time, stress] = [table.one(&["time"])?, table.one(&["stress"])?];
+//! let [time, stress] = [table.require_column(&["time"])?, table.require_column(&["stress"])?];
 //! assert_eq!(table.column::<TimeDimension>(time, None)?, [30.0, 60.0]);
 //! assert_eq!(table.column::<StressDimension>(stress, None)?, [1.25e6, 2.5e6]);
 //! let how = "separator `;`, decimal comma, UTF-8, headings in line 2, units in line 3";
-//! assert_eq!(table.understood(&[time, stress]), format!("{how}, columns `Time (min)`, `Stress`"));
+//! assert_eq!(table.describe(&[time, stress]), format!("{how}, columns `Time (min)`, `Stress`"));
 //! # Ok::<(), polycore::table::Error>(())
 //! ```
 
@@ -72,7 +72,7 @@ impl Table {
     /// [`crate::Error::Io`] and what [`Table::parse`] refuses.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, crate::Error> {
         let path = path.as_ref();
-        let bytes = std::fs::read(path).map_err(crate::Error::io("read", path))?;
+        let bytes = std::fs::read(path).map_err(crate::Error::from_io("read", path))?;
         Ok(Self::parse(path, bytes)?)
     }
 
@@ -92,7 +92,7 @@ impl Table {
         let (text, encoding) = text::decode(bytes)
             .map_err(|[found, allowed]| refuse(0, "file", found.to_owned(), allowed.to_owned()))?;
         let lines = text::lines(&text);
-        let (mut layout, heads) = match Layout::of(&lines) {
+        let (mut layout, heads) = match Layout::detect(&lines) {
             Ok(found) => found,
             Err((line, found)) => {
                 let allowed = "a line of headings above the numbers, such as `time [s],temperature [degC]`";
@@ -152,7 +152,7 @@ impl Table {
     }
 
     /// One line: how the file is written and which columns are used.
-    pub fn understood(&self, used: &[usize]) -> String {
+    pub fn describe(&self, used: &[usize]) -> String {
         let names: Vec<String> = used.iter().map(|&i| format!("`{}`", self.headings[i].text)).collect();
         let plural = if names.len() == 1 { "" } else { "s" };
         format!("{}, column{plural} {}", self.layout, names.join(", "))
@@ -189,7 +189,7 @@ impl Table {
     ///
     /// # Errors
     /// None or several of them.
-    pub fn one(&self, names: &[&str]) -> Result<usize, Error> {
+    pub fn require_column(&self, names: &[&str]) -> Result<usize, Error> {
         let found = self.matching(names);
         match found[..] {
             [column] => Ok(column),
@@ -268,7 +268,7 @@ impl Table {
         let unit = self.unit::<D>(column, default)?;
         let value = |row| {
             let number = self.number(row, column)?;
-            let quantity = unit.of(number);
+            let quantity = unit.quantity(number);
             quantity.map(|q| q.si()).map_err(|error| self.refuse_cell(row, column, &format!("{error}")))
         };
         (0..self.rows()).map(value).collect()

@@ -40,7 +40,7 @@ impl Cuboid {
     }
 
     /// The box around points.
-    pub fn around(points: &[[f64; 3]]) -> Self {
+    pub fn bounding(points: &[[f64; 3]]) -> Self {
         let [min, max] = bounds(points.iter().copied());
         Self { min, max }
     }
@@ -89,7 +89,7 @@ impl Overlap {
                 );
             }
             let corners = cell.map(|node| points[node as usize]);
-            let bounds = Cuboid::around(&corners);
+            let bounds = Cuboid::bounding(&corners);
             let number = index as u32;
             let before = found.len();
             if is_box(&corners, &bounds) {
@@ -130,18 +130,18 @@ impl Overlap {
     }
 
     /// Volume of the mesh in a box, m³.
-    pub fn covered(&self, index: usize) -> f64 {
-        self.parts.of(index).iter().map(|part| part.volume).sum()
+    pub fn covered_volume(&self, index: usize) -> f64 {
+        self.parts.group(index).iter().map(|part| part.volume).sum()
     }
 
     /// Nodes of the cells that have a part in a box.
     pub fn nodes_of(&self, index: usize) -> impl Iterator<Item = u32> + '_ {
-        self.parts.of(index).iter().flat_map(|part| self.cells[part.cell as usize])
+        self.parts.group(index).iter().flat_map(|part| self.cells[part.cell as usize])
     }
 
     /// Cells that have a part in a box.
     pub fn cells_of(&self, index: usize) -> impl Iterator<Item = u32> + '_ {
-        self.parts.of(index).iter().map(|part| part.cell)
+        self.parts.group(index).iter().map(|part| part.cell)
     }
 
     /// Means over the boxes of a field over cells; `None` where the mesh does not reach.
@@ -173,7 +173,7 @@ impl Overlap {
         fits("boxes", self.boxes(), values)?;
         let mut sums = vec![(0.0, 0.0); self.cells.len()];
         for (index, value) in values.iter().enumerate() {
-            for part in self.parts.of(index) {
+            for part in self.parts.group(index) {
                 let (volume, sum) = &mut sums[part.cell as usize];
                 *volume += part.volume;
                 *sum += part.volume * value;
@@ -191,7 +191,7 @@ impl Overlap {
         fits("boxes", self.boxes(), values)?;
         let mut sums = vec![(0.0, 0.0); self.nodes];
         for (index, value) in values.iter().enumerate() {
-            for part in self.parts.of(index) {
+            for part in self.parts.group(index) {
                 let (nodes, shape) = (self.cells[part.cell as usize], shapes(part.place));
                 for a in 0..8 {
                     let (volume, sum) = &mut sums[nodes[a] as usize];
@@ -206,7 +206,7 @@ impl Overlap {
     fn means(&self, value: impl Fn(&Part) -> f64) -> Vec<Option<f64>> {
         let of_box =
             |index| {
-                let parts = self.parts.of(index).iter();
+                let parts = self.parts.group(index).iter();
                 mean(parts.fold((0.0, 0.0), |(all, sum), part| {
                     (all + part.volume, sum + part.volume * value(part))
                 }))
@@ -326,7 +326,7 @@ impl Bins {
     fn new(boxes: &[Cuboid]) -> Self {
         let middles: Vec<[f64; 3]> =
             boxes.iter().map(|b| std::array::from_fn(|d| 0.5 * (b.min[d] + b.max[d]))).collect();
-        let bounds = Cuboid::around(&middles);
+        let bounds = Cuboid::bounding(&middles);
         let size = |d: usize| boxes.iter().map(move |b| b.max[d] - b.min[d]);
         let least = std::array::from_fn(|d| size(d).fold(f64::INFINITY, f64::min));
         let mut edge: [f64; 3] = std::array::from_fn(|d| size(d).fold(0.0, f64::max));
@@ -368,7 +368,7 @@ impl Bins {
         for c in low[2]..=high[2] {
             for b in low[1]..=high[1] {
                 let (first, last) = (self.index([low[0], b, c]), self.index([high[0], b, c]));
-                self.boxes.between(first, last).iter().for_each(|&index| visit(index));
+                self.boxes.groups(first, last).iter().for_each(|&index| visit(index));
             }
         }
     }

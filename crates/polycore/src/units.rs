@@ -72,7 +72,7 @@ impl<D: Dimension> FromStr for Quantity<D> {
         if !number.is_finite() {
             return Err(UnitError::Range { text: text.trim().into(), problem: "is not a finite number" });
         }
-        Unit::<D>::within(unit, text)?.of(number)
+        Unit::<D>::within(unit, text)?.quantity(number)
     }
 }
 
@@ -124,7 +124,7 @@ impl<D: Dimension> Unit<D> {
     ///
     /// # Errors
     /// Numbers that over- or underflow in SI units, and temperatures below absolute zero.
-    pub fn of(&self, number: f64) -> Result<Quantity<D>, UnitError> {
+    pub fn quantity(&self, number: f64) -> Result<Quantity<D>, UnitError> {
         // −0 stays −0
         let from_zero = if self.zero == 0.0 { number } else { number + self.zero };
         let si = from_zero * self.numerator / self.denominator;
@@ -264,7 +264,7 @@ macro_rules! dimensions {
 }
 
 /// Exponents of a `uom` quantity.
-macro_rules! of {
+macro_rules! exponents {
     ($quantity:ident) => {{
         use uom::si::Dimension as D;
         use uom::typenum::Integer as I;
@@ -281,37 +281,37 @@ macro_rules! of {
         ]
     }};
 }
-pub(crate) use of;
+pub(crate) use exponents;
 
 dimensions! {
     /// A number without a dimension; `"1 %"`, `"0.01"` and the bare `0.01` are all accepted.
-    Ratio, RatioDimension: of!(ratio), "a dimensionless number", "", "0.01";
+    Ratio, RatioDimension: exponents!(ratio), "a dimensionless number", "", "0.01";
     /// A length.
-    Length, LengthDimension: of!(length), "a length", "m", "2 mm";
+    Length, LengthDimension: exponents!(length), "a length", "m", "2 mm";
     /// An area.
-    Area, AreaDimension: of!(area), "an area", "m^2", "5 mm^2";
+    Area, AreaDimension: exponents!(area), "an area", "m^2", "5 mm^2";
     /// A volume.
-    Volume, VolumeDimension: of!(volume), "a volume", "m^3", "1 mm^3";
+    Volume, VolumeDimension: exponents!(volume), "a volume", "m^3", "1 mm^3";
     /// A time or duration.
-    Time, TimeDimension: of!(time), "a time", "s", "30 s";
+    Time, TimeDimension: exponents!(time), "a time", "s", "30 s";
     /// A mass.
-    Mass, MassDimension: of!(mass), "a mass", "kg", "2 kg";
+    Mass, MassDimension: exponents!(mass), "a mass", "kg", "2 kg";
     /// A force.
-    Force, ForceDimension: of!(force), "a force", "N", "10 N";
+    Force, ForceDimension: exponents!(force), "a force", "N", "10 N";
     /// A stress, pressure or elastic modulus.
-    Stress, StressDimension: of!(pressure), "a stress", "Pa", "0.6 N/mm^2";
+    Stress, StressDimension: exponents!(pressure), "a stress", "Pa", "0.6 N/mm^2";
     /// A mass density.
-    Density, DensityDimension: of!(mass_density), "a mass density", "kg/m^3", "1010 kg/m^3";
+    Density, DensityDimension: exponents!(mass_density), "a mass density", "kg/m^3", "1010 kg/m^3";
     /// A speed.
-    Speed, SpeedDimension: of!(velocity), "a speed", "m/s", "5 mm/s";
+    Speed, SpeedDimension: exponents!(velocity), "a speed", "m/s", "5 mm/s";
     /// An acceleration.
-    Acceleration, AccelerationDimension: of!(acceleration), "an acceleration", "m/s^2", "9.81 m/s^2";
+    Acceleration, AccelerationDimension: exponents!(acceleration), "an acceleration", "m/s^2", "9.81 m/s^2";
     /// A rate or frequency.
-    Rate, RateDimension: of!(frequency), "a rate", "1/s", "5e-5 /s";
+    Rate, RateDimension: exponents!(frequency), "a rate", "1/s", "5e-5 /s";
     /// An absolute temperature; the only quantity that may be given in `degC`.
-    Temperature, TemperatureDimension: of!(thermodynamic_temperature), "a temperature", "K", "220 degC", true;
+    Temperature, TemperatureDimension: exponents!(thermodynamic_temperature), "a temperature", "K", "220 degC", true;
     /// A difference of temperatures, in kelvin.
-    TemperatureDifference, TemperatureDifferenceDimension: of!(temperature_interval), "a temperature difference", "K", "5 K";
+    TemperatureDifference, TemperatureDifferenceDimension: exponents!(temperature_interval), "a temperature difference", "K", "5 K";
     /// A heating or cooling rate.
     TemperatureRate, TemperatureRateDimension: [0, 0, -1, 0, 1, 0, 0, 0], "a temperature rate", "K/s", "10 K/min";
     /// A square of temperatures, as nucleation constants are.
@@ -319,29 +319,29 @@ dimensions! {
     /// A change per temperature.
     PerTemperature, PerTemperatureDimension: [0, 0, 0, 0, -1, 0, 0, 0], "a number per temperature", "1/K", "0.965 1/K";
     /// An energy per amount of substance.
-    MolarEnergy, MolarEnergyDimension: of!(molar_energy), "a molar energy", "J/mol", "6270 J/mol";
+    MolarEnergy, MolarEnergyDimension: exponents!(molar_energy), "a molar energy", "J/mol", "6270 J/mol";
     /// An energy (a torque has the same dimension).
-    Energy, EnergyDimension: of!(energy), "an energy", "J", "1 J";
+    Energy, EnergyDimension: exponents!(energy), "an energy", "J", "1 J";
     /// A power.
-    Power, PowerDimension: of!(power), "a power", "W", "21 W";
+    Power, PowerDimension: exponents!(power), "a power", "W", "21 W";
     /// A power per mass, as calorimeters measure it.
     SpecificPower, SpecificPowerDimension: [2, 0, -3, 0, 0, 0, 0, 0], "a power per mass", "W/kg", "1.5 W/g";
     /// An energy per area or force per length: fracture energy, surface tension; `N/mm` = 1000 J/m².
-    EnergyPerArea, EnergyPerAreaDimension: of!(surface_tension), "an energy per area", "J/m^2", "2.67 N/mm";
+    EnergyPerArea, EnergyPerAreaDimension: exponents!(surface_tension), "an energy per area", "J/m^2", "2.67 N/mm";
     /// A specific energy or latent heat.
-    SpecificEnergy, SpecificEnergyDimension: of!(available_energy), "an energy per mass", "J/kg", "104.5 J/g";
+    SpecificEnergy, SpecificEnergyDimension: exponents!(available_energy), "an energy per mass", "J/kg", "104.5 J/g";
     /// A specific heat capacity.
-    SpecificHeat, SpecificHeatDimension: of!(specific_heat_capacity), "a specific heat capacity", "J/(kg K)", "2200 J/(kg K)";
+    SpecificHeat, SpecificHeatDimension: exponents!(specific_heat_capacity), "a specific heat capacity", "J/(kg K)", "2200 J/(kg K)";
     /// A thermal conductivity.
-    Conductivity, ConductivityDimension: of!(thermal_conductivity), "a thermal conductivity", "W/(m K)", "0.25 W/(m K)";
+    Conductivity, ConductivityDimension: exponents!(thermal_conductivity), "a thermal conductivity", "W/(m K)", "0.25 W/(m K)";
     /// A film coefficient of heat transfer.
-    HeatTransfer, HeatTransferDimension: of!(heat_transfer), "a heat transfer coefficient", "W/(m^2 K)", "50 W/(m^2 K)";
+    HeatTransfer, HeatTransferDimension: exponents!(heat_transfer), "a heat transfer coefficient", "W/(m^2 K)", "50 W/(m^2 K)";
     /// A heat flux.
-    HeatFlux, HeatFluxDimension: of!(heat_flux_density), "a heat flux", "W/m^2", "500 W/m^2";
+    HeatFlux, HeatFluxDimension: exponents!(heat_flux_density), "a heat flux", "W/m^2", "500 W/m^2";
     /// Heat released per volume and time.
     PowerDensity, PowerDensityDimension: [-1, 1, -3, 0, 0, 0, 0, 0], "a power per volume", "W/m^3", "1 W/mm^3";
     /// A thermal diffusivity or kinematic viscosity.
-    Diffusivity, DiffusivityDimension: of!(diffusion_coefficient), "a diffusivity", "m^2/s", "0.11 mm^2/s";
+    Diffusivity, DiffusivityDimension: exponents!(diffusion_coefficient), "a diffusivity", "m^2/s", "0.11 mm^2/s";
     /// A plane angle; needs its unit.
     Angle, AngleDimension: [0, 0, 0, 0, 0, 0, 0, 1], "an angle", "rad", "90 deg";
 }

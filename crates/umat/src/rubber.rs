@@ -68,7 +68,7 @@ impl Rubber {
         let found = self.law.tangent(&c, &mut Workspace::default()).map_err(stretched)?;
         let (s, tangent) = (found.stress, found.tangent.unwrap_or_default());
         let energy = found.energy.unwrap_or_default() / f.jacobian();
-        Ok((voigt::cauchy_of_material(&f, &s), voigt::jaumann_tangent(&f, &s, &tangent), energy))
+        Ok((voigt::cauchy_from_material(&f, &s), voigt::jaumann_tangent(&f, &s, &tangent), energy))
     }
 }
 

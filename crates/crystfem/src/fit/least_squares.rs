@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use nalgebra::{DMatrix, DVector};
-use polycore::numerics::least_squares::{Found, levenberg_marquardt};
+use polycore::numerics::least_squares::{Optimum, levenberg_marquardt};
 use polycore::posterior;
 use std::cell::Cell;
 
@@ -73,7 +73,8 @@ pub fn minimize(
     };
     for start in starts {
         let at = DVector::from_row_slice(start);
-        let Found { at, objective } = levenberg_marquardt(at, 200, trial, |at| jacobian(residuals, at, step));
+        let Optimum { at, objective } =
+            levenberg_marquardt(at, 200, trial, |at| jacobian(residuals, at, step));
         let better = best.as_ref().is_none_or(|(least, _)| objective < *least);
         if objective < REJECTED && better && residuals(at.as_slice()).is_some() {
             best = Some((objective, at));

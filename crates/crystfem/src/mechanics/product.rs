@@ -90,7 +90,7 @@ impl<'a> Elements<'a> {
         image.par_chunks_mut(ITEM).enumerate().for_each(|(item, image)| {
             for (k, image) in (item * ITEM..).zip(image) {
                 let mut sum = [0.0; 3];
-                for &corner in corners.of(k) {
+                for &corner in corners.group(k) {
                     let force = &forces[3 * corner as usize..][..3];
                     (0..3).for_each(|d| sum[d] += force[d]);
                 }

@@ -1,7 +1,7 @@
 //! Checks of a mesh before anything is computed on it.
 
 use nalgebra::Vector3;
-use polycore::numerics::Sets;
+use polycore::numerics::DisjointSets;
 use rayon::prelude::*;
 
 use crate::element::natural::{Natural, Rule, corner};
@@ -356,7 +356,7 @@ fn check_sets(mesh: &Mesh) -> Result<(), Error> {
 
 /// Parts that share no node, and nodes of no element: their number and the first.
 fn parts(mesh: &Mesh) -> (usize, usize, usize) {
-    let mut sets = Sets::new(mesh.points.len());
+    let mut sets = DisjointSets::new(mesh.points.len());
     let mut used = vec![false; mesh.points.len()];
     for element in 0..mesh.element_count() as u32 {
         let nodes = mesh.nodes(element);

@@ -32,7 +32,7 @@ impl Around {
     pub fn of(&self, node: u32, born: &[u32]) -> impl Iterator<Item = (u32, usize)> {
         let stride = self.stride;
         self.corners
-            .of(node as usize)
+            .group(node as usize)
             .iter()
             .map(move |&corner| (corner / stride, (corner % stride) as usize))
             .filter(|&(element, _)| born[element as usize] != NONE)

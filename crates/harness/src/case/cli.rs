@@ -186,7 +186,7 @@ pub fn main<C: Case, V: Subcommand>(own: impl FnOnce(V) -> Result<bool, Failure<
         }
         Command::Man { output } => prepare_directory(&output)
             .and_then(|()| {
-                clap_mangen::generate_to(command, &output).map_err(Error::io("write into", &output))
+                clap_mangen::generate_to(command, &output).map_err(Error::from_io("write into", &output))
             })
             .map(|()| true)
             .map_err(Failure::from),

@@ -348,11 +348,11 @@ fn sibling(program: &str) -> Result<PathBuf, String> {
 fn finished(command: &mut Command) -> Result<Option<ExitStatus>, Error> {
     let asked = interrupted();
     let program = PathBuf::from(command.get_program());
-    let mut child = command.stdin(Stdio::null()).spawn().map_err(Error::io("start", &program))?;
+    let mut child = command.stdin(Stdio::null()).spawn().map_err(Error::from_io("start", &program))?;
     let mut since = None;
     let mut pause = Duration::from_millis(2);
     loop {
-        if let Some(status) = child.try_wait().map_err(Error::io("wait for", &program))? {
+        if let Some(status) = child.try_wait().map_err(Error::from_io("wait for", &program))? {
             let stopped = status.code() == Some(i32::from(polycore::error::EXIT_INTERRUPTED));
             return Ok((!stopped && since.is_none()).then_some(status));
         }

@@ -50,7 +50,7 @@ fn write_cells(path: &Path, columns: &[Column<'_>], cell: impl Fn(f64) -> String
 pub fn read(path: impl AsRef<Path>) -> Result<Vec<(String, Vec<f64>)>, Error> {
     let path = path.as_ref();
     let fail = |reason: String| Error::Format { path: path.to_path_buf(), format: "CSV table", reason };
-    let text = std::fs::read_to_string(path).map_err(Error::io("read", path))?;
+    let text = std::fs::read_to_string(path).map_err(Error::from_io("read", path))?;
     let mut reader =
         csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
     let headings = reader.headers().map_err(|error| fail(error.to_string()))?;

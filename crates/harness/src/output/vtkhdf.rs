@@ -127,7 +127,7 @@ fn whole_file(target: &Path, write: impl FnOnce(&Path) -> Result<(), Error>) -> 
     let temporary = temporary_name(target);
     remove(&temporary)?;
     let result = write(&temporary)
-        .and_then(|()| fs::rename(&temporary, target).map_err(Error::io("rename to", target)));
+        .and_then(|()| fs::rename(&temporary, target).map_err(Error::from_io("rename to", target)));
     if result.is_err() {
         let _ = remove(&temporary);
     }
@@ -146,7 +146,7 @@ fn remove(path: &Path) -> Result<(), Error> {
         Ok(metadata) if metadata.is_dir() => fs::remove_dir_all(path),
         Ok(_) => fs::remove_file(path),
     };
-    removed.map_err(Error::io("remove", path))
+    removed.map_err(Error::from_io("remove", path))
 }
 
 fn data_error(path: &Path, reason: String) -> Error {

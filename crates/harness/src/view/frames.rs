@@ -95,7 +95,7 @@ impl Frames {
 /// # Errors
 /// [`Error::Io`].
 pub fn names(folder: &Path) -> Result<Vec<String>, Error> {
-    let entries = fs::read_dir(folder).map_err(Error::io("read", folder))?;
+    let entries = fs::read_dir(folder).map_err(Error::from_io("read", folder))?;
     let mut names: Vec<String> =
         entries.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
     names.sort();

@@ -1,6 +1,6 @@
 //! Particles as cells: deformed cells of a lattice that come apart at cracks, or a block for each particle of a cloud.
 
-use polycore::numerics::Sets;
+use polycore::numerics::DisjointSets;
 use rayon::prelude::*;
 
 use super::solid::{HEXAHEDRON, QUADRILATERAL, Solid};
@@ -136,7 +136,7 @@ impl Choice {
     /// in VTK's order.
     fn corners(&self, joined: &[Sides]) -> (Vec<(u32, u8)>, Vec<u32>) {
         let count = if self.plane { 4 } else { 8 };
-        let mut sets = Sets::new(joined.len() * count);
+        let mut sets = DisjointSets::new(joined.len() * count);
         for (particle, beside) in joined.iter().enumerate() {
             for axis in 0..3 {
                 let other = beside[2 * axis + 1];

@@ -50,7 +50,7 @@ impl Tables {
             format: "CSV table",
             reason: error.to_string(),
         };
-        let text = std::fs::read(path).map_err(Error::io("read", path))?;
+        let text = std::fs::read(path).map_err(Error::from_io("read", path))?;
         let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(text.as_slice());
         let headings = reader.headers().map_err(fail)?;
         let mut columns: Vec<(String, String, Vec<f64>)> = headings

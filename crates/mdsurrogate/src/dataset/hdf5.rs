@@ -10,7 +10,7 @@
 use super::stress::{Symmetry, cauchy_of_first};
 use super::{Dataset, Path, Row, Split, Standardisation};
 use crate::Error;
-use crate::kinematics::{cauchy_of_material, material_pair, stretch_of};
+use crate::kinematics::{cauchy_from_material, material_pair, stretch_of};
 use polycore::hdf5::{Created, dataset};
 use polycore::tensor::{DeformationGradient, Tensor, Voigt};
 use rust_hdf5::{DatatypeMessage, H5Dataset, H5File, H5Group};
@@ -42,11 +42,13 @@ pub fn write(
         .prefix(".")
         .suffix(".part")
         .tempdir_in(folder.unwrap_or(".".as_ref()))
-        .map_err(Error::io("create a folder beside", path))?;
+        .map_err(Error::from_io("create a folder beside", path))?;
     let inside = temporary.path().join("data.h5");
     fill(&inside, set, split).map_err(|error| polycore::hdf5::write_error(path, error))?;
-    std::fs::File::open(&inside).and_then(|file| file.sync_all()).map_err(Error::io("synchronise", path))?;
-    std::fs::rename(&inside, path).map_err(Error::io("write", path))
+    std::fs::File::open(&inside)
+        .and_then(|file| file.sync_all())
+        .map_err(Error::from_io("synchronise", path))?;
+    std::fs::rename(&inside, path).map_err(Error::from_io("write", path))
 }
 
 fn fill(path: &std::path::Path, set: &Dataset, split: Option<(&Split, &Standardisation)>) -> Hdf5<()> {
@@ -103,7 +105,7 @@ fn table(group: &H5Group, name: &str, columns: usize, data: &[f64]) -> Hdf5<()> 
 /// are no deformation.
 pub fn read(path: impl AsRef<std::path::Path>) -> Result<Dataset, Error> {
     let path = path.as_ref();
-    let size = std::fs::metadata(path).map_err(Error::io("open", path))?.len();
+    let size = std::fs::metadata(path).map_err(Error::from_io("open", path))?.len();
     let none = |error: rust_hdf5::Hdf5Error| Error::file(path, format!("no HDF5 file ({error})"), "HDF5");
     let file = H5File::open(path).map_err(none)?;
     let root = file.root_group();
@@ -188,7 +190,7 @@ pub fn read(path: impl AsRef<std::path::Path>) -> Result<Dataset, Error> {
             }
             None => {
                 let f = stretch_of(&c).map_err(at)?;
-                (f, cauchy_of_material(&f, &s))
+                (f, cauchy_from_material(&f, &s))
             }
         };
         target.push(Row { sample, time, deformation, cauchy, c, s, nominal: None });

@@ -23,7 +23,7 @@ const FEMTOSECOND: f64 = 1e-15;
 ///   Piola–Kirchhoff stress;
 /// - thermo output of LAMMPS in logs (also `thermo_style yaml`) and files of `fix ave/time`;
 /// - `C11 C22 C33 C12 C13 C23` and `S11 … S23`;
-/// - nominal stresses of an incompressible body, as [`hyperelastic::data::Table`] has them: `stretch,nominal_MPa`,
+/// - nominal stresses of an incompressible body, as [`hyperelastic::data::TestData`] has them: `stretch,nominal_MPa`,
 ///   `mode,stretch,nominal_MPa` (a run for each mode) or `stretch_1,stretch_2,nominal_1_MPa,nominal_2_MPa`.
 ///
 /// Optional columns: `run_id` (without it a file is one path), `kind`, `rate_x rate_y rate_z` (1/fs), `sample`,
@@ -73,8 +73,8 @@ fn is_rubber(table: &Table) -> bool {
 pub(super) fn is_hdf5(path: &std::path::Path) -> Result<bool, Error> {
     use std::io::Read;
     let mut start = Vec::new();
-    let file = std::fs::File::open(path).map_err(Error::io("open", path))?;
-    file.take(8).read_to_end(&mut start).map_err(Error::io("read", path))?;
+    let file = std::fs::File::open(path).map_err(Error::from_io("open", path))?;
+    file.take(8).read_to_end(&mut start).map_err(Error::from_io("read", path))?;
     let named = path.extension().is_some_and(|e| e == "h5" || e == "hdf5");
     Ok(named || start == b"\x89HDF\r\n\x1a\n")
 }
@@ -241,7 +241,7 @@ fn require_material(table: &Table, all: &[String]) -> Result<(), Error> {
 /// Nominal stresses over stretches: a run for each test, in order of appearance.
 fn nominal(table: &Table) -> Result<Dataset, Error> {
     let path = &table.path;
-    let reading = hyperelastic::data::Table::read_as(path, &hyperelastic::Meaning::default());
+    let reading = hyperelastic::data::TestData::read_as(path, &hyperelastic::TestFormat::default());
     let reading = reading.map_err(|error| match error {
         polycore::Error::Constitutive(constitutive::Error::Data { reason, .. }) => {
             Error::file(path, reason, "stretches and nominal stresses of an incompressible body")
@@ -276,7 +276,7 @@ fn nominal(table: &Table) -> Result<Dataset, Error> {
         set.paths.len(),
         set.skipped
     );
-    let more = table.understood().map(|_| &reading.understood).into_iter().chain(&reading.notes);
+    let more = table.understood().map(|_| &reading.description).into_iter().chain(&reading.notes);
     set.provenance.push(more.fold(line, |line, note| line + "; " + note));
     Ok(set)
 }

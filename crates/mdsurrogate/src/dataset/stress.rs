@@ -3,7 +3,7 @@
 use super::options::{Measure, PLACES, ReadOptions};
 use super::table::{Column, Table};
 use crate::Error;
-use crate::kinematics::{NAMES, cauchy_of_material};
+use crate::kinematics::{NAMES, cauchy_from_material};
 use polycore::tensor::{DeformationGradient, Tensor, Voigt, voigt};
 
 /// P Fᵀ of a first Piola–Kirchhoff stress is symmetric; rounding in tables and noise stay below this part of it.
@@ -108,7 +108,7 @@ impl Stress {
         match self {
             Self::Cauchy(_) => Voigt::from_row_slice(numbers),
             Self::Pressure(_) => -Voigt::from_row_slice(numbers),
-            Self::Second(_) => cauchy_of_material(f, &Voigt::from_row_slice(numbers)),
+            Self::Second(_) => cauchy_from_material(f, &Voigt::from_row_slice(numbers)),
             Self::First(_) => cauchy_of_first(f, numbers),
         }
     }

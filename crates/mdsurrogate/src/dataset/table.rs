@@ -244,7 +244,7 @@ fn unpacked(path: &Path) -> Result<(Vec<u8>, String), Error> {
     let mut packed = Vec::new();
     File::open(path)
         .and_then(|file| file.take(LARGEST + 1).read_to_end(&mut packed))
-        .map_err(Error::io("read", path))?;
+        .map_err(Error::from_io("read", path))?;
     let mut crc = Crc::new();
     crc.update(&packed);
     let fingerprint = format!("{} bytes, CRC-32 {:08x}", packed.len(), crc.sum());

@@ -341,7 +341,7 @@ pub(crate) fn set_of_a_law() -> Dataset {
             }
             let f = DeformationGradient::new(matrix).unwrap();
             let s = neo_hookean(&polycore::tensor::voigt::from_stress(&f.right_cauchy_green()));
-            Row::new(sample as u64, f64::NAN, f, crate::kinematics::cauchy_of_material(&f, &s))
+            Row::new(sample as u64, f64::NAN, f, crate::kinematics::cauchy_from_material(&f, &s))
         };
         let rows = (0..40).map(row).collect();
         let kind = format!("{}{}", if index % 6 > 2 { "b" } else { "u" }, index % 3);

@@ -11,7 +11,7 @@ pub use uncertainty::{FLAGS, Uncertainty};
 
 use crate::Error;
 use crate::dataset::{Dataset, Path, Row};
-use crate::surrogate::{History, Prediction, Surrogate, Workspace};
+use crate::surrogate::{Prediction, SofteningHistory, Surrogate, Workspace};
 use polycore::numerics::range;
 use polycore::tensor::Voigt;
 use std::time::Instant;
@@ -55,7 +55,7 @@ pub fn errors<'a>(law: &Surrogate, rows: impl Iterator<Item = &'a Row>) -> Resul
 /// # Errors
 /// Those of [`Surrogate::stress`].
 pub fn errors_along(law: &Surrogate, run: &Path) -> Result<Errors, Error> {
-    let (mut memory, mut history) = (Workspace::default(), History::default());
+    let (mut memory, mut history) = (Workspace::default(), SofteningHistory::default());
     sum_up(run.rows.iter().map(|row| Ok((row, law.follow(&row.c, false, &mut history, &mut memory)?))))
 }
 

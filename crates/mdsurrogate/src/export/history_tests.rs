@@ -3,7 +3,7 @@
 use super::tests::{numbers_of, run, there};
 use super::*;
 use crate::network::Activation::Softplus;
-use crate::surrogate::{History, Kind, Softening, Workspace};
+use crate::surrogate::{Kind, Softening, SofteningHistory, Workspace};
 use evidence::hosts;
 use polycore::tensor::{DeformationGradient, Tensor, Voigt, voigt};
 use std::process::Command;
@@ -26,7 +26,7 @@ fn path() -> Vec<DeformationGradient> {
 
 /// S along the path, MPa.
 fn stresses(law: &Surrogate) -> Vec<Voigt> {
-    let (mut memory, mut history) = (Workspace::default(), History::default());
+    let (mut memory, mut history) = (Workspace::default(), SofteningHistory::default());
     let c = |f: &DeformationGradient| voigt::from_stress(&f.right_cauchy_green());
     path().iter().map(|f| law.follow(&c(f), false, &mut history, &mut memory).unwrap().stress / 1e6).collect()
 }

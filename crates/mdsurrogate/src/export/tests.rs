@@ -35,7 +35,7 @@ fn laws() -> Vec<(String, Surrogate<f64>)> {
     // rows near each other: the other deformations are far from them
     let near = c_of(&deformations()[0]);
     let rows = [near, 1.01 * near, 1.02 * near];
-    header.support = Some(Support::of(&rows, 2).unwrap());
+    header.support = Some(Support::from_rows(&rows, 2).unwrap());
     laws.push(("relu".into(), Surrogate::random(header, 2).unwrap()));
     let mut header = Header::new(Kind::Ann, &[], 1);
     header.architecture = Architecture::thesis(4).unwrap();

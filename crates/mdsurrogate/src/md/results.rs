@@ -36,7 +36,7 @@ pub fn read_run(inst: &Path, mean: &Path, protocol: &Protocol) -> Result<(Vec<Sa
 }
 
 fn read(path: &Path, numbers: std::ops::RangeInclusive<u64>, every: u64) -> Result<Vec<Sample>, Error> {
-    let text = std::fs::read_to_string(path).map_err(Error::io("read", path))?;
+    let text = std::fs::read_to_string(path).map_err(Error::from_io("read", path))?;
     let mut samples = Vec::new();
     for (index, line) in text.lines().enumerate().filter(|(_, line)| !line.trim_start().starts_with('#')) {
         let cells: Vec<&str> = line.split_whitespace().collect();

@@ -142,7 +142,7 @@ fn export(law: &Path, output: &Path, form: Form, options: OnnxOptions) -> Result
         Form::Onnx => vec![("onnx", onnx(&law, options)?)],
     };
     if let Some(folder) = output.parent() {
-        std::fs::create_dir_all(folder).map_err(Error::io("create", folder))?;
+        std::fs::create_dir_all(folder).map_err(Error::from_io("create", folder))?;
     }
     for (end, bytes) in files {
         let path = output.with_file_name(format!("{name}.{end}"));

@@ -6,7 +6,7 @@
 //!
 //! ```
 //! use mdsurrogate::dataset::{Dataset, Path, Row};
-//! use mdsurrogate::kinematics::cauchy_of_material;
+//! use mdsurrogate::kinematics::cauchy_from_material;
 //! use mdsurrogate::network::{Activation::Softplus, Architecture};
 //! use mdsurrogate::surrogate::{Header, Kind, Symmetry, Workspace};
 //! use mdsurrogate::train::{Settings, fit};
@@ -18,7 +18,7 @@
 //!     let stretch = 0.9 + 0.003 * f64::from(sample);
 //!     let f = DeformationGradient::new(Tensor::new(stretch, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0))?;
 //!     let s = Voigt::new(1e9 * (stretch * stretch - 1.0) / 2.0, 0.0, 0.0, 0.0, 0.0, 0.0);
-//!     rows.push(Row::new(sample as u64, f64::NAN, f, cauchy_of_material(&f, &s)));
+//!     rows.push(Row::new(sample as u64, f64::NAN, f, cauchy_from_material(&f, &s)));
 //! }
 //! let rows: Vec<&Row> = rows.iter().collect();
 //! let architecture = Architecture::new(7, &[(16, Softplus)], 1);

@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::dataset::Path;
-use crate::surrogate::{History, Softening, Surrogate, Workspace};
+use crate::surrogate::{Softening, SofteningHistory, Surrogate, Workspace};
 use nalgebra::{DMatrix, DVector};
 use polycore::numerics::least_squares::levenberg_marquardt;
 use polycore::tensor::Voigt;
@@ -40,7 +40,7 @@ pub fn soften(law: Surrogate, paths: &[&Path], units: usize) -> Result<Surrogate
     let mut rows = Vec::new();
     let mut greatest = 0.0f64;
     for path in paths {
-        let mut history = History::default();
+        let mut history = SofteningHistory::default();
         for (row, loading) in path.rows.iter().zip(loading(path)) {
             let answer = law.stress(&row.c, &mut memory)?;
             let energy = answer.energy.unwrap_or(0.0);
@@ -67,7 +67,7 @@ pub fn soften(law: Surrogate, paths: &[&Path], units: usize) -> Result<Surrogate
 
 struct Problem {
     /// W, the history, S of the energy, S measured.
-    rows: Vec<(f64, History, Voigt, Voigt)>,
+    rows: Vec<(f64, SofteningHistory, Voigt, Voigt)>,
     greatest: f64,
     scale: f64,
     start: DVector<f64>,
@@ -81,7 +81,7 @@ impl Problem {
 
     fn residuals(&self, at: &DVector<f64>) -> DVector<f64> {
         let softening = self.softening(at);
-        let row = |(energy, history, own, measured): &(f64, History, Voigt, Voigt)| -> [f64; 6] {
+        let row = |(energy, history, own, measured): &(f64, SofteningHistory, Voigt, Voigt)| -> [f64; 6] {
             let [damage, _] = softening.damage(*energy, *history);
             ((own * (1.0 - damage) - measured) / self.scale).into()
         };
@@ -123,20 +123,20 @@ impl Problem {
 mod tests {
     use super::*;
     use crate::dataset::Row;
-    use crate::kinematics::cauchy_of_material;
+    use crate::kinematics::cauchy_from_material;
     use crate::network::Activation::Softplus;
     use crate::surrogate::{Header, Kind, Symmetry};
     use polycore::tensor::{DeformationGradient, Tensor, Voigt};
 
     /// Stretched along x to `most` and back.
     fn there_and_back(law: &Surrogate, most: f64) -> Path {
-        let (mut memory, mut history) = (Workspace::default(), History::default());
+        let (mut memory, mut history) = (Workspace::default(), SofteningHistory::default());
         let rows = (0..=100u64).map(|sample| {
             let stretch = 1.0 + (most - 1.0) * (1.0 - (sample as f64 / 50.0 - 1.0).abs());
             let f = DeformationGradient::new(Tensor::from_diagonal(&[stretch, 1.0, 1.0].into())).unwrap();
             let c = Voigt::new(stretch * stretch, 1.0, 1.0, 0.0, 0.0, 0.0);
             let s = law.follow(&c, false, &mut history, &mut memory).unwrap().stress;
-            Row::new(sample, f64::NAN, f, cauchy_of_material(&f, &s))
+            Row::new(sample, f64::NAN, f, cauchy_from_material(&f, &s))
         });
         Path { id: most.to_string(), kind: "ux".into(), rates: [f64::NAN; 3], rows: rows.collect() }
     }
@@ -155,7 +155,7 @@ mod tests {
         let found = soften(energy.clone(), &paths, 1).unwrap();
         // the prior takes 1e-4 of the stress
         let between = there_and_back(&softened, 1.25);
-        let (mut memory, mut history) = (Workspace::default(), History::default());
+        let (mut memory, mut history) = (Workspace::default(), SofteningHistory::default());
         for row in &between.rows {
             let stress = found.follow(&row.c, false, &mut history, &mut memory).unwrap().stress;
             assert!((stress - row.s).norm() <= 1e-3 * row.s.norm().max(1.0), "{} {stress}", row.s);

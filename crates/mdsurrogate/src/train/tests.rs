@@ -1,6 +1,6 @@
 use super::*;
 use crate::dataset::tests::{neo_hookean, rows_of_a_law};
-use crate::kinematics::cauchy_of_material;
+use crate::kinematics::cauchy_from_material;
 use crate::network::Activation::{Elu, Linear, Relu, Sigmoid, Silu, Softplus, Tanh};
 use crate::network::{Activation, Architecture};
 use crate::surrogate::{Kind, Symmetry, Workspace};
@@ -286,7 +286,7 @@ fn rows_of_rubber() -> Vec<Row> {
                 u64::from(sample),
                 f64::NAN,
                 f,
-                cauchy_of_material(&f, &voigt::from_stress(&s)),
+                cauchy_from_material(&f, &voigt::from_stress(&s)),
             ));
         }
     }
@@ -419,9 +419,10 @@ fn schedules() {
 fn trained_on_softening_data() {
     let mut rows = rows_of_a_law();
     for row in &mut rows {
-        let strain = voigt::strain_of_right_cauchy_green(&row.c);
+        let strain = voigt::strain_from_right_cauchy_green(&row.c);
         let softer = row.s / (1.0 + strain.norm_squared() / 0.02);
-        *row = Row::new(row.sample, row.time, row.deformation, cauchy_of_material(&row.deformation, &softer));
+        *row =
+            Row::new(row.sample, row.time, row.deformation, cauchy_from_material(&row.deformation, &softer));
     }
     let rows: Vec<&Row> = rows.iter().collect();
     let mut random = crate::random::SplitMix64::new(9);
@@ -431,10 +432,10 @@ fn trained_on_softening_data() {
             trained(&header, &rows, Settings { epochs: 60, learning_rate: 1e-2, ..Settings::default() });
         let law = ensemble(header, &[training.best().to_vec()]).unwrap();
         // a trained model is a law as any other
-        let found = verify::Deviations::of(&law, &verify::deformations()[..4]).unwrap();
+        let found = verify::Deviations::measure(&law, &verify::deformations()[..4]).unwrap();
         assert!(found.stress.unwrap() < 2e-8 && found.tangent < 2e-8 && found.asymmetry < 1e-14, "{found:?}");
         assert!(found.stress_at_rest == 0.0 && found.objectivity < 1e-12 && found.bits == 0.0, "{found:?}");
-        (training.state().best_loss(), verify::lost_waves(&law, 200, &mut random).unwrap(), law)
+        (training.state().best_loss(), verify::count_ellipticity_losses(&law, 200, &mut random).unwrap(), law)
     };
     for symmetry in [Symmetry::Orthotropic, Symmetry::Transverse, Symmetry::Isotropic] {
         let (bound, lost, law) = train(Kind::polyconvex_energy(symmetry));

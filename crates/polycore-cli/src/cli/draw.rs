@@ -4,9 +4,9 @@ use std::path::Path;
 
 use harness::output::picture::{LinePlot, Series};
 use polycore::Error;
-use polycore::constitutive::hyperelastic::data::{Mode, State, Table};
+use polycore::constitutive::hyperelastic::data::{Mode, TestData, TestState};
 use polycore::constitutive::hyperelastic::fit::{self, Fit};
-use polycore::constitutive::hyperelastic::{Hyperelastic, Kind, homogeneous};
+use polycore::constitutive::hyperelastic::{Hyperelastic, ModelKind, homogeneous};
 
 use super::MPA;
 
@@ -14,7 +14,7 @@ use super::MPA;
 struct Test {
     key: &'static str,
     title: &'static str,
-    holds: fn(&State) -> bool,
+    holds: fn(&TestState) -> bool,
     nominal: fn(&dyn Hyperelastic, f64) -> Result<f64, polycore::constitutive::Error>,
 }
 
@@ -52,19 +52,19 @@ const TESTS: [Test; 3] = [
 const POINTS: usize = 200;
 
 /// The thesis' two categories have pictures of their own: together they would be more curves than colours.
-const KINDS: [(Kind, &str); 2] =
-    [(Kind::Phenomenological, "phenomenological"), (Kind::Micromechanical, "chains")];
+const KINDS: [(ModelKind, &str); 2] =
+    [(ModelKind::Phenomenological, "phenomenological"), (ModelKind::Micromechanical, "chains")];
 
 /// `<data>_<test>_<kind>.png` for every kind of test with at least three states, and `<data>_parity_<kind>.png` for
 /// biaxial tables.
-pub fn pictures(directory: &Path, name: &str, table: &Table, fits: &[Fit]) -> Result<(), Error> {
+pub fn pictures(directory: &Path, name: &str, table: &TestData, fits: &[Fit]) -> Result<(), Error> {
     for (kind, suffix) in KINDS {
         let fits: Vec<&Fit> = fits.iter().filter(|fit| fit.model.kind == kind).collect();
         if fits.is_empty() {
             continue;
         }
         for test in &TESTS {
-            let states: Vec<&State> = table.states.iter().filter(|state| (test.holds)(state)).collect();
+            let states: Vec<&TestState> = table.states.iter().filter(|state| (test.holds)(state)).collect();
             if states.len() >= 3 {
                 let path = directory.join(format!("{name}_{}_{suffix}.png", test.key));
                 curves(name, test, &states, &fits).write(path)?;
@@ -78,7 +78,7 @@ pub fn pictures(directory: &Path, name: &str, table: &Table, fits: &[Fit]) -> Re
 }
 
 /// Nominal stress over stretch.
-fn curves(name: &str, test: &Test, states: &[&State], fits: &[&Fit]) -> LinePlot {
+fn curves(name: &str, test: &Test, states: &[&TestState], fits: &[&Fit]) -> LinePlot {
     let x: Vec<f64> = states.iter().map(|state| state.stretches[0]).collect();
     let y: Vec<f64> = states.iter().map(|state| state.nominal[0] / MPA).collect();
     let [low, high] = span(&x, 1.0).map(|l| 1.0 + 1.03 * (l - 1.0)).map(|l| l.max(0.01));
@@ -101,7 +101,7 @@ fn curves(name: &str, test: &Test, states: &[&State], fits: &[&Fit]) -> LinePlot
 }
 
 /// Every stress of the table, model over measurement.
-fn parity(name: &str, table: &Table, fits: &[&Fit]) -> Result<LinePlot, Error> {
+fn parity(name: &str, table: &TestData, fits: &[&Fit]) -> Result<LinePlot, Error> {
     let measured: Vec<f64> = table
         .states
         .iter()

@@ -8,8 +8,10 @@ use harness::output;
 use harness::report::{Phases, Report};
 use polycore::Error;
 use polycore::constitutive;
-use polycore::constitutive::hyperelastic::data::{Mode, State, Table};
-use polycore::constitutive::hyperelastic::fit::{Agreement, Fit, Fitted, Standing, fit_until};
+use polycore::constitutive::hyperelastic::data::{Mode, TestData, TestState};
+use polycore::constitutive::hyperelastic::fit::{
+    Agreement, Fit, FittedParameter, Identifiability, fit_until,
+};
 use polycore::constitutive::hyperelastic::{Hyperelastic, homogeneous, stability};
 
 use super::MPA;
@@ -106,9 +108,9 @@ fn judge_on(
     report: &mut Report,
     key: &str,
     law: &dyn Hyperelastic,
-    table: &Table,
+    table: &TestData,
 ) -> Result<Option<Agreement>, Error> {
-    let locks = |state: &&State| {
+    let locks = |state: &&TestState| {
         let [a, b] = state.stretches;
         matches!(homogeneous::biaxial(law, a, b), Err(constitutive::Error::Locked { .. }))
     };
@@ -117,7 +119,7 @@ fn judge_on(
     if locked > 0 {
         return Ok(None);
     }
-    let found = Agreement::of(law, table)?;
+    let found = Agreement::new(law, table)?;
     agree(report, key, &found);
     Ok(Some(found))
 }
@@ -130,7 +132,7 @@ fn agree(report: &mut Report, key: &str, found: &Agreement) {
     }
 }
 
-fn record(report: &mut Report, data: &str, table: &Table, fit: &Fit) -> Result<(), Error> {
+fn record(report: &mut Report, data: &str, table: &TestData, fit: &Fit) -> Result<(), Error> {
     let key = format!("{data}.{}", fit.model.key);
     report.value(q::SHEAR_MODULUS.of(&[&key]), fit.law.shear_modulus() / MPA);
     for parameter in &fit.parameters {
@@ -141,7 +143,7 @@ fn record(report: &mut Report, data: &str, table: &Table, fit: &Fit) -> Result<(
             report.value(quantity, scaled(error, parameter.unit).0);
         }
     }
-    agree(report, &key, &Agreement::of(&fit.law, table)?);
+    agree(report, &key, &Agreement::new(&fit.law, table)?);
     report.value(q::STABLE.of(&[&key]), f64::from(u8::from(unstable(fit, table).is_none())));
     report.work(&format!("{key}.evaluations"), fit.iterations as u64);
     report.work(&format!("{key}.starts"), fit.starts.0 as u64);
@@ -150,7 +152,7 @@ fn record(report: &mut Report, data: &str, table: &Table, fit: &Fit) -> Result<(
 }
 
 /// Where a law first is unstable over the stretches of a table: the test and its stretch.
-fn unstable(fit: &Fit, table: &Table) -> Option<(Mode, f64)> {
+fn unstable(fit: &Fit, table: &TestData) -> Option<(Mode, f64)> {
     let ends = stability::range(table);
     let all = Mode::TESTS.into_iter().flat_map(|mode| ends.map(|end| (mode, end)));
     all.filter(|(_, end)| *end != 1.0)
@@ -170,7 +172,7 @@ fn write_fits(directory: &Path, all: &[Set]) -> Result<(), Error> {
                 let _ = writeln!(text, "{data},{law},{quantity},{value},{error},{shown}");
             };
             line("rms", fit.rms, None, "Pa");
-            if let Some(r2) = Agreement::of(&fit.law, set.table)?.r2 {
+            if let Some(r2) = Agreement::new(&fit.law, set.table)?.r2 {
                 line("r2", r2, None, "");
             }
             for (_, other, found) in set.crossed.iter().filter(|crossed| crossed.0 == fit.model.key) {
@@ -178,7 +180,8 @@ fn write_fits(directory: &Path, all: &[Set]) -> Result<(), Error> {
                     line(&format!("r2.{other}"), r2, None, "");
                 }
             }
-            for parameter in fit.parameters.iter().filter(|parameter| parameter.standing != Standing::Absent)
+            for parameter in
+                fit.parameters.iter().filter(|parameter| parameter.identifiability != Identifiability::Absent)
             {
                 line(parameter.name, parameter.value, parameter.standard_error, parameter.unit);
             }
@@ -197,8 +200,8 @@ fn write_draws(directory: &Path, name: &str, fit: &Fit) -> Result<(), Error> {
     if fit.draws.is_empty() {
         return Ok(());
     }
-    let unit = |parameter: &Fitted| scaled(0.0, parameter.unit).1;
-    let column = |(i, parameter): (usize, &Fitted)| {
+    let unit = |parameter: &FittedParameter| scaled(0.0, parameter.unit).1;
+    let column = |(i, parameter): (usize, &FittedParameter)| {
         fit.draws.iter().map(|draw| scaled(draw[i], parameter.unit).0).collect()
     };
     let lists: Vec<Vec<f64>> = fit.parameters.iter().enumerate().map(column).collect();
@@ -208,7 +211,7 @@ fn write_draws(directory: &Path, name: &str, fit: &Fit) -> Result<(), Error> {
 }
 
 /// `<data>_states.csv`: the measured states, and beside them what every law makes of them.
-fn write_states(directory: &Path, name: &str, table: &Table, fits: &[Fit]) -> Result<(), Error> {
+fn write_states(directory: &Path, name: &str, table: &TestData, fits: &[Fit]) -> Result<(), Error> {
     let mut columns: Vec<(String, &str, Vec<f64>)> = Vec::new();
     for i in [0, 1] {
         let stretches = table.states.iter().map(|state| state.stretches[i]).collect();
@@ -307,7 +310,7 @@ fn verdicts(set: &Set) -> String {
             Some(r2) => format!("{r2:.0e}"),
             None => "-".to_owned(),
         };
-        let own = Agreement::of(&fit.law, set.table).ok().and_then(|found| found.r2);
+        let own = Agreement::new(&fit.law, set.table).ok().and_then(|found| found.r2);
         let _ = write!(text, "  {key:<22}{}", shown(own));
         let crossed: Vec<_> = set.crossed.iter().filter(|crossed| crossed.0 == key).collect();
         for (_, other, found) in &crossed {
@@ -333,14 +336,14 @@ fn verdicts(set: &Set) -> String {
 }
 
 /// `links 25.46 ± 0.13`.
-fn shown(parameter: &Fitted) -> String {
+fn shown(parameter: &FittedParameter) -> String {
     let name = parameter.name;
     let (unit, scale) = if parameter.unit == "Pa" { unit_of(parameter.value) } else { ("", 1.0) };
     let number = |value: f64| digits(value / scale, 6);
-    match parameter.standing {
-        Standing::Absent => format!("{name} absent"),
-        Standing::Undetermined => format!("{name} not determined"),
-        Standing::Determined => {
+    match parameter.identifiability {
+        Identifiability::Absent => format!("{name} absent"),
+        Identifiability::Undetermined => format!("{name} not determined"),
+        Identifiability::Determined => {
             let error = parameter.standard_error.map(|error| digits(error / scale, 2));
             let error = error.unwrap_or_else(|| "-".to_owned());
             format!("{name} {} ± {error} {unit}", number(parameter.value)).trim_end().to_owned()

@@ -5,7 +5,7 @@ use std::io::Write as _;
 use std::path::Path;
 
 use polycore::Error;
-use polycore::constitutive::hyperelastic::fit::{Fit, Fitted, Standing};
+use polycore::constitutive::hyperelastic::fit::{Fit, FittedParameter, Identifiability};
 use polycore::file::atomic_write;
 
 use super::set::{Set, unit_of};
@@ -60,10 +60,10 @@ fn block(fit: &Fit) -> String {
 /// Why a fitted law is no material to use, and what to take.
 pub fn unusable(fit: &Fit) -> Option<String> {
     let names = |standing| -> Vec<&str> {
-        let those = fit.parameters.iter().filter(|parameter| parameter.standing == standing);
+        let those = fit.parameters.iter().filter(|parameter| parameter.identifiability == identifiability);
         those.map(|parameter| parameter.name).collect()
     };
-    let (absent, open) = (names(Standing::Absent), names(Standing::Undetermined));
+    let (absent, open) = (names(Identifiability::Absent), names(Identifiability::Undetermined));
     if !absent.is_empty() {
         return Some(format!("without {} it is a law of fewer parameters: take that", absent.join(", ")));
     }
@@ -79,7 +79,7 @@ pub fn unusable(fit: &Fit) -> Option<String> {
 /// half of its size come first.
 pub fn best(data: &str, fits: &[Fit]) -> String {
     let known = |fit: &Fit| {
-        let sure = |parameter: &Fitted| {
+        let sure = |parameter: &FittedParameter| {
             parameter.standard_error.is_some_and(|error| HALF_WIDTH * error < parameter.value.abs())
         };
         fit.parameters.iter().all(sure)

@@ -5,10 +5,10 @@ use std::path::PathBuf;
 
 use harness::report::Expect;
 use harness::scene::{SceneError, Source};
-use polycore::constitutive::hyperelastic::data::{Mode, Table};
+use polycore::constitutive::hyperelastic::data::{Mode, TestData};
 use polycore::constitutive::hyperelastic::fit::neo_hookean_modulus;
 use polycore::constitutive::hyperelastic::{
-    self, MODELS, Meaning, ModelDescriptor, StrainMeasure, StressMeasure,
+    self, MODELS, ModelDescriptor, StrainMeasure, TestFormat, TestStressMeasure,
 };
 use serde::Deserialize;
 
@@ -70,7 +70,7 @@ struct Data {
     /// Measure of the strain where its heading leaves it open.
     strain: Option<StrainMeasure>,
     /// Measure of the stress where its heading leaves it open.
-    stress: Option<StressMeasure>,
+    stress: Option<TestStressMeasure>,
     /// Unit of a stress whose heading has none: `MPa`.
     stress_unit: Option<String>,
     /// Heading of the strain, of several.
@@ -82,7 +82,7 @@ struct Data {
 /// A table to be fitted.
 pub struct DataSet {
     pub name: String,
-    pub table: Table,
+    pub table: TestData,
     /// How its file was understood, and what was left out of it, a line each.
     pub read: Vec<String>,
 }
@@ -126,7 +126,7 @@ impl Case {
                     "another name",
                 ));
             }
-            let meaning = Meaning {
+            let meaning = TestFormat {
                 mode: entry.mode,
                 strain: entry.strain,
                 stress: entry.stress,
@@ -134,12 +134,12 @@ impl Case {
                 strain_column: entry.strain_column,
                 stress_column: entry.stress_column,
             };
-            let reading = Table::read_as(source.file(&entry.file), &meaning)
+            let reading = TestData::read_as(source.file(&entry.file), &meaning)
                 .map_err(|error| source.refused(&key("file"), error))?;
-            let read = [vec![reading.understood], reading.notes].concat();
+            let read = [vec![reading.description], reading.notes].concat();
             let mut table = reading.table;
             if let Some(mode) = entry.mode {
-                table = table.of(mode).map_err(|error| {
+                table = table.select(mode).map_err(|error| {
                     source.error(&key("mode"), error, "a test of which the table has a stress")
                 })?;
             }

@@ -1,12 +1,12 @@
 //! Fits of one table.
 
-use polycore::constitutive::hyperelastic::data::Table;
+use polycore::constitutive::hyperelastic::data::TestData;
 use polycore::constitutive::hyperelastic::fit::{Agreement, Fit};
 
 /// What was fitted to one table.
 pub struct Set<'a> {
     pub name: &'a str,
-    pub table: &'a Table,
+    pub table: &'a TestData,
     /// How the file was understood.
     pub read: &'a [String],
     pub fits: Vec<Fit>,

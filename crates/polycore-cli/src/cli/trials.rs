@@ -4,7 +4,7 @@ use harness::report::{self, Judgement, Quantity, Report};
 use harness::scene::{SceneError, Source};
 use polycore::Error;
 use polycore::constitutive;
-use polycore::constitutive::hyperelastic::data::{Mode, State, Table};
+use polycore::constitutive::hyperelastic::data::{Mode, TestData, TestState};
 use polycore::constitutive::hyperelastic::fit::fit;
 use polycore::constitutive::hyperelastic::{
     self, Compressible, Hyperelastic, Volumetric, homogeneous, model, plane_stress,
@@ -82,12 +82,12 @@ impl Trial {
     fn attempt(&self) -> Result<Seen, constitutive::Error> {
         let model = model(&self.law)?;
         if let Some(data) = &self.data {
-            let state = |(stretch, nominal): &(f64, Stress)| State {
+            let state = |(stretch, nominal): &(f64, Stress)| TestState {
                 mode: self.mode,
                 stretches: [*stretch, self.mode.second_stretch(*stretch)],
                 nominal: [nominal.si(), 0.0],
             };
-            let table = Table { source: String::new(), states: data.iter().map(state).collect() };
+            let table = TestData { source: String::new(), states: data.iter().map(state).collect() };
             return Ok(Seen::Fit(Box::new(fit(model, &table)?)));
         }
         let values: Vec<f64> = self.parameters.iter().flatten().map(Number::si).collect();

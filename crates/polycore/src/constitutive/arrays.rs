@@ -1,6 +1,6 @@
 //! Laws at many points, and data of fits, as arrays (feature `ndarray`): views go in, arrays come out.
 
-use super::hyperelastic::data::{Mode, State, Table};
+use super::hyperelastic::data::{Mode, TestData, TestState};
 use super::law::same_length;
 use super::{Error, Flags, Law, Prediction, Workspace};
 use crate::tensor::Voigt;
@@ -64,7 +64,7 @@ pub fn rows(array: ArrayView2<'_, f64>, name: &'static str) -> Result<Vec<Voigt>
     Ok(array.rows().into_iter().map(|row| Voigt::from_fn(|a, _| row[a])).collect())
 }
 
-impl Table {
+impl TestData {
     /// Stretches, (N), and nominal stresses, (N) in Pa, of a test that one stretch describes; a stress of exactly 0 is a
     /// condition, not a measurement.
     ///
@@ -79,11 +79,11 @@ impl Table {
         same_length(stretch.len(), nominal.len())?;
         let state = |(&stretch, &nominal): (&f64, &f64)| {
             let stretches = [stretch, mode.second_stretch(stretch)];
-            let state = State { mode, stretches, nominal: [nominal, 0.0] };
+            let state = TestState { mode, stretches, nominal: [nominal, 0.0] };
             state.principal_stretches().map(|_| state)
         };
         let states = stretch.iter().zip(nominal).map(state).collect::<Result<_, Error>>()?;
-        Self { source: String::new(), states }.of(mode)
+        Self { source: String::new(), states }.select(mode)
     }
 }
 
@@ -130,12 +130,12 @@ mod tests {
             (Mode::Equibiaxial, homogeneous::equibiaxial),
         ] {
             let nominal = stretch.mapv(|stretch| of(&law, stretch).unwrap());
-            let table = Table::from_arrays(mode, stretch.view(), nominal.view()).unwrap();
+            let table = TestData::from_arrays(mode, stretch.view(), nominal.view()).unwrap();
             let fitted = fit::fit(model("neo-hookean").unwrap(), &table).unwrap();
             assert!((fitted.parameters[0].value / 3e5 - 1.0).abs() < 1e-9);
-            assert!(Table::from_arrays(mode, stretch.view(), nominal.slice(s![1..])).is_err());
-            assert!(Table::from_arrays(mode, (-&stretch).view(), nominal.view()).is_err());
-            assert!(Table::from_arrays(mode, stretch.slice(s![..1]), nominal.slice(s![..1])).is_err());
+            assert!(TestData::from_arrays(mode, stretch.view(), nominal.slice(s![1..])).is_err());
+            assert!(TestData::from_arrays(mode, (-&stretch).view(), nominal.view()).is_err());
+            assert!(TestData::from_arrays(mode, stretch.slice(s![..1]), nominal.slice(s![..1])).is_err());
         }
     }
 }

@@ -45,9 +45,9 @@ mod yeoh;
 
 pub use chain::{EightChain, EightChainRootI2, ThreeChain};
 #[cfg(feature = "tables")]
-pub use columns::{StrainMeasure, StressMeasure};
+pub use columns::{StrainMeasure, TestStressMeasure};
 pub use compressible::{Compressible, Coupling, Volumetric};
-pub use descriptor::{Domain, Kind, ModelDescriptor, Parameter};
+pub use descriptor::{Domain, ModelDescriptor, ModelKind, Parameter};
 pub use gent::Gent;
 pub use homogeneous::{PlaneStress, plane_stress};
 pub use models::{MODELS, all, model};

@@ -54,7 +54,7 @@ pub trait Law: Send + Sync {
         memory: &mut Workspace,
     ) -> Result<(Voigt, Prediction), Error> {
         let prediction = self.stress(&voigt::from_stress(&deformation.right_cauchy_green()), memory)?;
-        Ok((voigt::cauchy_of_material(deformation, &prediction.stress), prediction))
+        Ok((voigt::cauchy_from_material(deformation, &prediction.stress), prediction))
     }
 
     /// Bulk and shear modulus of the tangent at C = 1, of a law without stress there: Voigt's averages over all
@@ -162,7 +162,7 @@ impl<L: Hyperelastic + ?Sized> Law for L {
 }
 
 fn isotropic<L: Hyperelastic + ?Sized>(law: &L, c: &Voigt, tangent: bool) -> Result<Prediction, Error> {
-    let frame = DeformationGradient::of_right_cauchy_green(c)?.principal_frame();
+    let frame = DeformationGradient::from_right_cauchy_green(c)?.principal_frame();
     let response = law.response_at(frame.stretches)?;
     let turned = || -> Voigt6x6 { voigt::transform_tangent(&response.tangent(), &frame.referential) };
     Ok(Prediction {

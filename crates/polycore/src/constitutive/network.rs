@@ -332,7 +332,7 @@ mod tests {
                     let (mut next, mut next_slopes) = (Vec::new(), Vec::new());
                     for (row, bias) in layer.weights.chunks(values.len()).zip(&layer.bias) {
                         let sum: f64 = row.iter().zip(&values).map(|(w, y)| w * y).sum();
-                        let [value, first, _] = layer.activation.at(sum + bias);
+                        let [value, first, _] = layer.activation.derivatives(sum + bias);
                         next.push(value);
                         let slope = |b: usize| row.iter().zip(&slopes).map(|(w, s)| w * s[b]).sum::<f64>();
                         next_slopes.push((0..inputs).map(|b| first * slope(b)).collect());

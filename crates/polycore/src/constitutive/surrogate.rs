@@ -34,7 +34,7 @@ pub use evaluate::Features;
 pub use examples::examples;
 pub use header::{Header, Kind};
 pub use invariants::{Invariants, derivative};
-pub use softening::{History, Softening};
+pub use softening::{Softening, SofteningHistory};
 pub use support::Support;
 pub use symmetry::{Monomial, StressAtRest, Symmetry};
 
@@ -60,7 +60,7 @@ pub struct Surrogate<T: Real = f64> {
     turn: Option<[[T; 6]; 6]>,
     nearest: Option<Nearest<T>>,
     /// Of each member of an energy, so that W(I) = 0 and S(I) = 0.
-    rest: Vec<Rest<T>>,
+    rest: Vec<RestTerm<T>>,
 }
 
 /// What is kept between evaluations.
@@ -73,7 +73,7 @@ struct Memory<T> {
 
 /// What is taken from a member's energy: its value at I and a function that is linear in c or in the invariants.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Rest<T> {
+pub struct RestTerm<T> {
     /// W at I.
     pub value: T,
     /// −∂/∂c.
@@ -98,7 +98,7 @@ pub struct Coefficients<'a, T> {
     /// From C to the material axes, row by row; none for the axes of the data.
     pub turn: Option<&'a [[T; 6]; 6]>,
     /// Of each member of an energy.
-    pub rest: &'a [Rest<T>],
+    pub rest: &'a [RestTerm<T>],
     /// Distance in standard deviations beyond which a C is far from all representatives of the training strains.
     pub farthest: Option<f64>,
 }
@@ -158,7 +158,7 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
             rest: Vec::new(),
         };
         if let Some(invariants) = law.header.kind.invariants() {
-            law.rest = vec![Rest::default(); law.members.len()];
+            law.rest = vec![RestTerm::default(); law.members.len()];
             for m in 0..law.members.len() {
                 law.rest[m] = law.rest_of(m, invariants);
             }
@@ -195,10 +195,10 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
     /// axes, add ½|sᵢ| (aᵢ·Caᵢ − 1) for sᵢ < 0 and ½sᵢ (aᵢ·cof C aᵢ − 1) − sᵢ(J − 1) for sᵢ > 0, since
     /// 2 ∂(aᵢ·cof C aᵢ)/∂C = 2(1 − aᵢ⊗aᵢ) and 2 ∂J/∂C = 1 at I (after Linden et al. 2023,
     /// <https://doi.org/10.1016/j.jmps.2023.105363>).
-    fn rest_of(&self, m: usize, invariants: Invariants) -> Rest<T> {
+    fn rest_of(&self, m: usize, invariants: Invariants) -> RestTerm<T> {
         let mut tape = Tape::default();
         let identity = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0].map(T::from_f64);
-        let mut rest = Rest::default();
+        let mut rest = RestTerm::default();
         invariants.values(&identity, &mut rest.at);
         if let Kind::Energy { symmetry, polyconvex: true, .. } = self.header.kind {
             let last = invariants.count() - 1;

@@ -36,7 +36,7 @@ impl Deviations {
     ///
     /// # Errors
     /// What the law refuses at one of them, or a step of 1e-5 beside it.
-    pub fn of(law: &dyn Law, deformations: &[DeformationGradient]) -> Result<Self, Error> {
+    pub fn measure(law: &dyn Law, deformations: &[DeformationGradient]) -> Result<Self, Error> {
         let mut memory = Workspace::default();
         let mut all = Self::default();
         let rotation = nalgebra::Rotation3::from_euler_angles(0.3, -1.1, 2.0).into_inner();
@@ -103,7 +103,11 @@ impl Deviations {
 ///
 /// # Errors
 /// What the law refuses.
-pub fn lost_waves(law: &dyn Law, count: usize, random: &mut SplitMix64) -> Result<usize, Error> {
+pub fn count_ellipticity_losses(
+    law: &dyn Law,
+    count: usize,
+    random: &mut SplitMix64,
+) -> Result<usize, Error> {
     let mut memory = Workspace::default();
     let mut lost = 0;
     for _ in 0..count {
@@ -177,7 +181,7 @@ mod tests {
         let laws = hyperelastic::all().unwrap();
         let mut stress_free = 0;
         for law in &laws {
-            let found = Deviations::of(law, &deformations()).unwrap();
+            let found = Deviations::measure(law, &deformations()).unwrap();
             let name = hyperelastic::Hyperelastic::name(law);
             check(&name, &found);
             assert!(found.stress.is_some() && found.shear_at_rest < 1e-15, "{name}: {found:?}");
@@ -198,7 +202,7 @@ mod tests {
     #[test]
     fn every_kind_of_learnt_model() {
         for (name, model) in crate::constitutive::surrogate::examples().unwrap() {
-            let found = Deviations::of(&model, &deformations()).unwrap();
+            let found = Deviations::measure(&model, &deformations()).unwrap();
             check(&name, &found);
             match found.stress {
                 Some(_) => {
@@ -221,7 +225,7 @@ mod tests {
                 Ok(Prediction { tangent: None, ..self.tangent(c, memory)? })
             }
             fn tangent(&self, c: &Voigt, _: &mut Workspace) -> Result<Prediction, Error> {
-                let e = voigt::strain_of_right_cauchy_green(c);
+                let e = voigt::strain_from_right_cauchy_green(c);
                 let mut tangent = Voigt6x6::from_diagonal(&Voigt::new(1.0, 1.0, 1.0, 0.5, 0.5, 0.5));
                 let mut stress = tangent * e;
                 let energy = Some(0.5 * stress.dot(&e));
@@ -234,7 +238,7 @@ mod tests {
                 Ok(Prediction { stress, tangent: Some(tangent), energy, ..Prediction::default() })
             }
         }
-        let of = |slip| Deviations::of(&Slip(slip), &deformations()).unwrap();
+        let of = |slip| Deviations::measure(&Slip(slip), &deformations()).unwrap();
         check("none", &of(0));
         assert!(of(1).tangent > 0.1 && of(2).stress.unwrap() > 0.1 && of(2).tangent > 0.1);
         assert!(of(3).asymmetry > 1e-4);

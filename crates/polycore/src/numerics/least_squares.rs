@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector, Dyn, Owned};
 
 /// A minimum, or where the search ended.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Found {
+pub struct Optimum {
     /// Parameters.
     pub at: DVector<f64>,
     /// ½Σr².
@@ -19,10 +19,10 @@ pub fn levenberg_marquardt(
     patience: usize,
     residuals: impl Fn(&DVector<f64>) -> Option<DVector<f64>>,
     jacobian: impl Fn(&DVector<f64>) -> Option<DMatrix<f64>>,
-) -> Found {
+) -> Optimum {
     let problem = Problem { at: start, residuals, jacobian };
     let (problem, report) = LevenbergMarquardt::new().with_patience(patience).minimize(problem);
-    Found { at: problem.at, objective: report.objective_function }
+    Optimum { at: problem.at, objective: report.objective_function }
 }
 
 struct Problem<R, J> {

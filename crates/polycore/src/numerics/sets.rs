@@ -2,9 +2,9 @@
 
 /// Sets of the numbers 0 … n − 1, each at first alone. The least number of a set stands for it, whatever the order of unions.
 #[derive(Clone, Debug)]
-pub struct Sets(Vec<u32>);
+pub struct DisjointSets(Vec<u32>);
 
-impl Sets {
+impl DisjointSets {
     /// So many numbers.
     pub fn new(count: usize) -> Self {
         Self((0..count as u32).collect())
@@ -41,7 +41,7 @@ mod tests {
     /// Numbers that differ by 6 or by 10 are of one parity.
     #[test]
     fn parities() {
-        let mut sets = Sets::new(100);
+        let mut sets = DisjointSets::new(100);
         let joined = (0..100).rev().flat_map(|k| [(k, k + 6), (k, k + 10)]).filter(|pair| pair.1 < 100);
         let joins = joined.filter(|&(a, b)| sets.join(b, a)).count();
         assert_eq!(joins, 98);

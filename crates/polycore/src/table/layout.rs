@@ -184,7 +184,7 @@ fn uncommented(line: &str) -> &str {
 
 impl Layout {
     /// The layout of a text; a row that stands where headings should, if there are none.
-    pub(super) fn of(lines: &[&str]) -> Result<(Self, Heads), (usize, String)> {
+    pub(super) fn detect(lines: &[&str]) -> Result<(Self, Heads), (usize, String)> {
         let written = |(_, line): &(usize, &str)| !line.trim().is_empty() && !is_comment(line);
         let numbered = || lines.iter().copied().enumerate();
         let mut sample: Vec<(usize, &str)> = numbered().filter(written).take(SAMPLE).collect();

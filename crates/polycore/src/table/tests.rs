@@ -10,8 +10,8 @@ fn refused(text: &str) -> String {
         Err(error) => return error.to_string(),
         Ok(table) => table,
     };
-    let values = table.one(&["strain"]).and_then(|i| table.column::<RatioDimension>(i, None));
-    let other = table.one(&["stress"]).and_then(|i| table.column::<StressDimension>(i, None));
+    let values = table.require_column(&["strain"]).and_then(|i| table.column::<RatioDimension>(i, None));
+    let other = table.require_column(&["stress"]).and_then(|i| table.column::<StressDimension>(i, None));
     values.and(other).expect_err(text).to_string()
 }
 
@@ -48,10 +48,11 @@ fn ways_to_write_a_table() {
         ("strain [-],stress [MPa]\n1.25E-1,5e-1\n+.25,1.5\n", "decimal point"),
     ] {
         let table = parse(text);
-        let [strain, stress] = [table.one(&["strain"]).unwrap(), table.one(&["stress"]).unwrap()];
+        let [strain, stress] =
+            [table.require_column(&["strain"]).unwrap(), table.require_column(&["stress"]).unwrap()];
         assert_eq!(table.column::<RatioDimension>(strain, Some("")).unwrap(), [0.125, 0.25], "{text}");
         assert_eq!(table.column::<StressDimension>(stress, None).unwrap(), [0.5e6, 1.5e6], "{text}");
-        let said = table.understood(&[strain, stress]);
+        let said = table.describe(&[strain, stress]);
         assert!(said.contains(how), "{said}\n{text}");
     }
 }
@@ -73,7 +74,7 @@ fn encodings() {
     ] {
         let table = Table::parse("t.csv", bytes).unwrap();
         assert_eq!(table.layout().encoding, name);
-        let column = table.one(&["temp"]).unwrap();
+        let column = table.require_column(&["temp"]).unwrap();
         assert_eq!(table.column::<TemperatureDimension>(column, None).unwrap(), [293.65], "{name}");
     }
     for (bytes, part) in [
@@ -95,7 +96,10 @@ fn units_below_headings_between_blanks() {
     let table = parse(text);
     let units: Vec<_> = table.headings.iter().map(|heading| heading.unit.as_deref()).collect();
     assert_eq!(units, [None, Some("s"), Some("°C"), Some("mW")]);
-    assert_eq!(table.column::<TimeDimension>(table.one(&["time", "t"]).unwrap(), None).unwrap(), [0.0, 60.0]);
+    assert_eq!(
+        table.column::<TimeDimension>(table.require_column(&["time", "t"]).unwrap(), None).unwrap(),
+        [0.0, 60.0]
+    );
     assert_eq!((table.line(1), table.layout().heading_line), (7, 4));
 }
 

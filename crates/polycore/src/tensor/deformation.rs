@@ -63,7 +63,7 @@ impl DeformationGradient {
     ///
     /// # Errors
     /// [`Error::NotPositiveDefinite`].
-    pub fn of_right_cauchy_green(c: &Voigt) -> Result<Self, Error> {
+    pub fn from_right_cauchy_green(c: &Voigt) -> Result<Self, Error> {
         let first = c[0].sqrt();
         let (f12, f13) = (c[3] / first, c[4] / first);
         let second = (c[1] - f12 * f12).sqrt();
@@ -169,7 +169,7 @@ impl DeformationGradient {
 
 impl Invariants {
     /// (1.10)–(1.12): I₁ = Σλᵢ², I₂ = Σλᵢ²λⱼ² (i < j), I₃ = Πλᵢ².
-    pub fn of_stretches(stretches: [f64; 3]) -> Self {
+    pub fn from_stretches(stretches: [f64; 3]) -> Self {
         let [a, b, c] = stretches.map(|l| l * l);
         Self { first: a + b + c, second: a * b + b * c + c * a, third: a * b * c }
     }
@@ -320,7 +320,7 @@ mod tests {
     fn a_deformation_of_its_right_cauchy_green_tensor() {
         let matrix = Tensor::new(1.3, 0.4, -0.2, 0.1, 0.8, 0.3, -0.3, 0.2, 1.7);
         let c = DeformationGradient::new(matrix).unwrap().right_cauchy_green();
-        let f = DeformationGradient::of_right_cauchy_green(&voigt::from_stress(&c)).unwrap();
+        let f = DeformationGradient::from_right_cauchy_green(&voigt::from_stress(&c)).unwrap();
         assert!((f.right_cauchy_green() - c).amax() < 1e-15 * 4.0, "some roundings of numbers up to 3");
         for bad in [
             Voigt::new(1.0, 1.0, 1.0, 1.0, 0.0, 0.0),
@@ -329,7 +329,7 @@ mod tests {
             Voigt::new(0.0, 1.0, 1.0, 0.0, 0.0, 0.0),
             Voigt::new(1.0, f64::INFINITY, 1.0, 0.0, 0.0, 0.0),
         ] {
-            let refused = DeformationGradient::of_right_cauchy_green(&bad);
+            let refused = DeformationGradient::from_right_cauchy_green(&bad);
             assert!(matches!(refused, Err(Error::NotPositiveDefinite { .. })), "{bad}");
         }
     }
@@ -370,8 +370,8 @@ mod tests {
         assert!(relative(invariants.first, c.trace()) < 1e-15);
         assert!(relative(invariants.second, 0.5 * (c.trace().powi(2) - (c * c).trace())) < 1e-14);
         assert!(relative(invariants.third, c.determinant()) < 1e-14);
-        let of_stretches = Invariants::of_stretches(f.principal_stretches());
-        assert!(relative(of_stretches.second, invariants.second) < 1e-14);
+        let from_stretches = Invariants::from_stretches(f.principal_stretches());
+        assert!(relative(from_stretches.second, invariants.second) < 1e-14);
         let isochoric = f.isochoric();
         assert!((determinant(isochoric.matrix()) - 1.0).abs() < 1e-15);
         assert!(relative(invariants.isochoric().first, isochoric.invariants().first) < 1e-15);

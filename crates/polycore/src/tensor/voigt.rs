@@ -42,7 +42,7 @@ pub fn to_strain(strain: &Voigt) -> Tensor {
 }
 
 /// E = ½(C − 1) as a strain vector from C as in (3.2): [(C₁₁ − 1)/2, …, C₁₂, C₁₃, C₂₃].
-pub fn strain_of_right_cauchy_green(c: &Voigt) -> Voigt {
+pub fn strain_from_right_cauchy_green(c: &Voigt) -> Voigt {
     Voigt::from_fn(|a, _| if a < 3 { 0.5 * (c[a] - 1.0) } else { c[a] })
 }
 
@@ -81,7 +81,7 @@ pub fn spatial_tangent(deformation: &DeformationGradient, material_tangent: &Voi
 }
 
 /// σ = F S Fᵀ / J of a second Piola–Kirchhoff stress S (3.6).
-pub fn cauchy_of_material(deformation: &DeformationGradient, second_piola_kirchhoff: &Voigt) -> Voigt {
+pub fn cauchy_from_material(deformation: &DeformationGradient, second_piola_kirchhoff: &Voigt) -> Voigt {
     use StressMeasure::{Cauchy, SecondPiolaKirchhoff};
     let s = to_stress(second_piola_kirchhoff);
     from_stress(&deformation.convert_stress(&s, SecondPiolaKirchhoff, Cauchy))
@@ -95,7 +95,7 @@ pub fn jaumann_tangent(
     second_piola_kirchhoff: &Voigt,
     tangent: &Voigt6x6,
 ) -> Voigt6x6 {
-    let sigma = to_stress(&cauchy_of_material(deformation, second_piola_kirchhoff));
+    let sigma = to_stress(&cauchy_from_material(deformation, second_piola_kirchhoff));
     let delta = |i: usize, j: usize| f64::from(u8::from(i == j));
     let rate = Voigt6x6::from_fn(|a, b| {
         let ((i, j), (k, l)) = (PAIRS[a], PAIRS[b]);
@@ -164,7 +164,7 @@ mod tests {
         assert_eq!(component(&tangent, 0, 1, 1, 0), 1.0);
         // dS = D dE, with E = ½(C − 1)
         let zero = Voigt::new(1.0, 1.0, 1.0, 0.0, 0.0, 0.0);
-        let stress = tangent * strain_of_right_cauchy_green(&c);
+        let stress = tangent * strain_from_right_cauchy_green(&c);
         assert_eq!(stress, c - zero);
     }
 

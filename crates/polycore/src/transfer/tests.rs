@@ -111,13 +111,14 @@ fn general_hexahedra() {
     let field: Vec<f64> = points.iter().map(|p| 1.0 + p[0] * p[1] - p[2]).collect();
     let [volume, exact] = integral(&points, &cells, &field).unwrap();
     let means = overlap.from_nodes(&field).unwrap();
-    let sum: f64 = means.iter().enumerate().filter_map(|(k, mean)| Some((*mean)? * overlap.covered(k))).sum();
-    let covered: f64 = (0..boxes.len()).map(|k| overlap.covered(k)).sum();
+    let sum: f64 =
+        means.iter().enumerate().filter_map(|(k, mean)| Some((*mean)? * overlap.covered_volume(k))).sum();
+    let covered: f64 = (0..boxes.len()).map(|k| overlap.covered_volume(k)).sum();
     assert!((covered - volume).abs() < 1e-12 * volume, "{covered} {volume}");
     assert!((sum - exact).abs() < 1e-12 * volume, "{sum} {exact}");
     // a box in the middle is full
     let middle = boxes.iter().position(|b| b.min == [2.0, 1.0, 1.0]).unwrap();
-    let full = overlap.covered(middle) / 0.125;
+    let full = overlap.covered_volume(middle) / 0.125;
     assert!((full - 1.0).abs() < 0.15, "{full}");
 }
 
@@ -129,7 +130,7 @@ fn what_does_not_fit() {
         |points: &[[f64; 3]], boxes: &[Cuboid]| Overlap::new(points, &cells, boxes).unwrap_err().to_string();
     assert!(told(&points, &[Cuboid { min: [0.0; 3], max: [1.0, 0.0, 1.0] }]).contains("without volume"));
     let far = Overlap::new(&points, &cells, &[Cuboid { min: [2.0; 3], max: [3.0; 3] }]).unwrap();
-    assert_eq!((far.from_cells(&[1.0]).unwrap(), far.covered(0)), (vec![None], 0.0));
+    assert_eq!((far.from_cells(&[1.0]).unwrap(), far.covered_volume(0)), (vec![None], 0.0));
     assert!(Overlap::new(&points, &cells, &[]).unwrap().from_cells(&[1.0]).unwrap().is_empty());
     let turned: Vec<[f64; 3]> = points.iter().map(|&[x, y, z]| [1.0 - x - 0.1 * y, y, z]).collect();
     assert!(told(&turned, &unit).contains("turned inside out"));

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::LazyLock;
 
-use super::{Exponents, of};
+use super::{Exponents, exponents};
 
 type Table = HashMap<&'static str, ([f64; 2], Exponents)>;
 
@@ -28,19 +28,19 @@ static TABLE: LazyLock<Table> = LazyLock::new(|| {
         )+};
     }
     add! {
-        ratio, Ratio, of!(ratio);
-        length, Length, of!(length);
-        mass, Mass, of!(mass);
-        time, Time, of!(time);
-        temperature_interval, TemperatureInterval, of!(temperature_interval);
-        amount_of_substance, AmountOfSubstance, of!(amount_of_substance);
-        electric_current, ElectricCurrent, of!(electric_current);
-        force, Force, of!(force);
-        pressure, Pressure, of!(pressure);
-        energy, Energy, of!(energy);
-        power, Power, of!(power);
-        frequency, Frequency, of!(frequency);
-        volume, Volume, of!(volume);
+        ratio, Ratio, exponents!(ratio);
+        length, Length, exponents!(length);
+        mass, Mass, exponents!(mass);
+        time, Time, exponents!(time);
+        temperature_interval, TemperatureInterval, exponents!(temperature_interval);
+        amount_of_substance, AmountOfSubstance, exponents!(amount_of_substance);
+        electric_current, ElectricCurrent, exponents!(electric_current);
+        force, Force, exponents!(force);
+        pressure, Pressure, exponents!(pressure);
+        energy, Energy, exponents!(energy);
+        power, Power, exponents!(power);
+        frequency, Frequency, exponents!(frequency);
+        volume, Volume, exponents!(volume);
         angle, Angle, [0, 0, 0, 0, 0, 0, 0, 1];
     }
     let aliases = [

@@ -1,6 +1,6 @@
 //! Shells of a surface: whether they are closed, and which side of each is outside.
 
-use polycore::numerics::{Sets, bounds};
+use polycore::numerics::{DisjointSets, bounds};
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
@@ -95,7 +95,7 @@ pub(super) fn shells(
         }
     }
     closed(path, points, &edges)?;
-    let mut joined = Sets::new(triangles.len());
+    let mut joined = DisjointSets::new(triangles.len());
     for (k, &[a, b, c]) in (0_u32..).zip(&*triangles) {
         for [p, q] in [[a, b], [b, c], [c, a]] {
             joined.join(k, edges.get(&[p.min(q), p.max(q)]).map_or(k, |edge| edge.1));

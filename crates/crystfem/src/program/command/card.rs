@@ -72,7 +72,7 @@ pub fn write(options: &Options) -> Result<bool, Failure> {
         written.push((format!("{name}.inp"), deck));
         written.extend(rest.map(|rest| (format!("{}.umatht", host_name(&name).to_lowercase()), rest)));
     }
-    std::fs::create_dir_all(&options.output).map_err(polycore::Error::io("create", &options.output))?;
+    std::fs::create_dir_all(&options.output).map_err(polycore::Error::from_io("create", &options.output))?;
     for (file, text) in written {
         let path = options.output.join(file);
         atomic_write(&path, |out| out.write_all(text.as_bytes()))?;

@@ -174,7 +174,7 @@ fn compare(scene: &PartScene, rows: &Rows, output: &Path) -> Result<(), polycore
     for row in rows.rows.iter().filter(|row| row.outcome.is_ok()) {
         // what is there, study by study: a study may have probes of its own
         let folder = output.join(&row.name);
-        let entries = std::fs::read_dir(&folder).map_err(polycore::Error::io("read", &folder))?;
+        let entries = std::fs::read_dir(&folder).map_err(polycore::Error::from_io("read", &folder))?;
         let names = entries.flatten().filter_map(|entry| entry.file_name().into_string().ok());
         for file in names.filter(|name| name.starts_with("probe_") && name.ends_with(".csv")) {
             let columns = csv::read(folder.join(&file))?;

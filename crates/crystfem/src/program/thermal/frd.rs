@@ -52,7 +52,7 @@ impl Frd {
     /// # Errors
     /// [`Error::File`] for what is no such file; I/O errors.
     fn open(path: &Path) -> Result<Self, Error> {
-        let file = File::open(path).map_err(polycore::Error::io("read", path))?;
+        let file = File::open(path).map_err(polycore::Error::from_io("read", path))?;
         let mut frd = Self {
             path: path.to_path_buf(),
             lines: BufReader::new(file).lines(),

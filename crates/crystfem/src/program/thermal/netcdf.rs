@@ -30,7 +30,7 @@ impl Netcdf {
             std::io::Read::read_exact(&mut file, &mut magic)?;
             Ok((magic, file.metadata()?.len()))
         };
-        let (magic, bytes) = read(path).map_err(polycore::Error::io("read", path))?;
+        let (magic, bytes) = read(path).map_err(polycore::Error::from_io("read", path))?;
         let form = match &magic {
             b"CDF\x01" | b"CDF\x02" => {
                 let file = FileReader::open(path).map_err(|error| unusable(path, &format!("{error:?}")))?;

@@ -57,7 +57,7 @@ fn beside(path: &Path, name: &str) -> PathBuf {
 
 /// Times and files of a series.
 fn series(path: &Path) -> Result<Vec<(f64, Vec<PathBuf>)>, Error> {
-    let text = std::fs::read_to_string(path).map_err(polycore::Error::io("read", path))?;
+    let text = std::fs::read_to_string(path).map_err(polycore::Error::from_io("read", path))?;
     let mut files: Vec<(f64, Vec<PathBuf>)> = Vec::new();
     elements(path, text.as_bytes(), |name, attributes, _| {
         if name == "DataSet" {
@@ -159,7 +159,7 @@ impl Grid {
                 grid.read(file)?;
                 continue;
             }
-            let text = std::fs::read_to_string(file).map_err(polycore::Error::io("read", file))?;
+            let text = std::fs::read_to_string(file).map_err(polycore::Error::from_io("read", file))?;
             let mut pieces = Vec::new();
             elements(file, text.as_bytes(), |name, attributes, _| {
                 if let ("Piece", Some(source)) = (name, attributes.get("Source")) {
@@ -178,7 +178,7 @@ impl Grid {
     }
 
     fn read(&mut self, path: &Path) -> Result<(), Error> {
-        let bytes = std::fs::read(path).map_err(polycore::Error::io("read", path))?;
+        let bytes = std::fs::read(path).map_err(polycore::Error::from_io("read", path))?;
         let wrong = |reason: &str| unusable(path, reason);
         // raw bytes are no XML: what is appended is cut off before it is parsed
         let at = bytes.windows(13).position(|window| window == b"<AppendedData").unwrap_or(bytes.len());

@@ -272,7 +272,7 @@ impl Xdmf {
 
     fn binary(&self, item: &Node, file: &str) -> Result<Vec<f64>, Error> {
         let path = self.path.with_file_name(file);
-        let bytes = std::fs::read(&path).map_err(polycore::Error::io("read", &path))?;
+        let bytes = std::fs::read(&path).map_err(polycore::Error::from_io("read", &path))?;
         let kind = match item.get("NumberType") {
             "" => item.get("DataType"),
             kind => kind,

@@ -46,7 +46,7 @@ impl Node {
 
 /// Reads a file; what holds all of it has no name.
 pub(super) fn read(path: &Path) -> Result<Node, Error> {
-    let text = std::fs::read_to_string(path).map_err(polycore::Error::io("read", path))?;
+    let text = std::fs::read_to_string(path).map_err(polycore::Error::from_io("read", path))?;
     let wrong = |reason: String| unusable(path, &reason);
     let mut reader = Reader::from_str(&text);
     let mut open = vec![Node::default()];

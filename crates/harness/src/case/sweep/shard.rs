@@ -63,7 +63,7 @@ pub fn job<C: Case>(
 ) -> Result<String, Failure<C::Error>> {
     let runs = runs::<C>(source, vary, options.quick)?.len();
     polycore::file::prepare_directory(options.output)?;
-    let here = std::env::current_dir().map_err(Error::io("read", "."))?;
+    let here = std::env::current_dir().map_err(Error::from_io("read", "."))?;
     let text = script(command, &here, &here.join(options.output), parts.min(runs));
     let path = options.output.join("job.sh");
     polycore::file::atomic_write(&path, |file| std::io::Write::write_all(file, text.as_bytes()))?;

@@ -99,7 +99,7 @@ impl Cells {
         for row in home[1].saturating_sub(1)..=(home[1] + 1).min(self.count[1] - 1) {
             let first = self.index([home[0].saturating_sub(1), row]);
             let last = self.index([(home[0] + 1).min(self.count[0] - 1), row]);
-            for &particle in self.particles.between(first, last) {
+            for &particle in self.particles.groups(first, last) {
                 each(particle);
             }
         }

@@ -93,7 +93,7 @@ impl Frames {
         };
         if self.steps == 1 {
             // it is the whole series
-            fs::rename(self.frame(0), &self.path).map_err(Error::io("rename to", &self.path))?;
+            fs::rename(self.frame(0), &self.path).map_err(Error::from_io("rename to", &self.path))?;
             sync_directory(parent(&self.path));
             remove(&self.frames)?;
             return Ok(self.path);
@@ -119,7 +119,7 @@ impl Frames {
     }
 
     fn prepare(&self) -> Result<(), Error> {
-        fs::create_dir_all(&self.frames).map_err(Error::io("create", &self.frames))?;
+        fs::create_dir_all(&self.frames).map_err(Error::from_io("create", &self.frames))?;
         remove(&temporary_name(&self.path))
     }
 
@@ -143,9 +143,9 @@ impl Frames {
     /// Removes later frames and whatever a killed writer left behind.
     fn discard_from(&self, steps: usize) -> Result<(), Error> {
         let keep: Vec<PathBuf> = (0..steps).map(|step| self.frame(step)).collect();
-        let entries = fs::read_dir(&self.frames).map_err(Error::io("list", &self.frames))?;
+        let entries = fs::read_dir(&self.frames).map_err(Error::from_io("list", &self.frames))?;
         for entry in entries {
-            let path = entry.map_err(Error::io("list", &self.frames))?.path();
+            let path = entry.map_err(Error::from_io("list", &self.frames))?.path();
             if !keep.contains(&path) {
                 remove(&path)?;
             }

@@ -29,8 +29,10 @@ pub struct Series {
 pub fn read(path: impl AsRef<Path>) -> Result<Series, Error> {
     let path = path.as_ref();
     // tells a missing file from a damaged one
-    let size =
-        std::fs::File::open(path).and_then(|file| file.metadata()).map_err(Error::io("open", path))?.len();
+    let size = std::fs::File::open(path)
+        .and_then(|file| file.metadata())
+        .map_err(Error::from_io("open", path))?
+        .len();
     let fail = |reason: &str| format_error(path, reason);
     let hdf5 = |error: rust_hdf5::Hdf5Error| format_error(path, error);
     let file = H5File::open(path).map_err(hdf5)?;

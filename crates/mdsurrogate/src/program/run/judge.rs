@@ -9,7 +9,7 @@ use crate::eval::{
     within_rates,
 };
 use crate::program::quantities as q;
-use crate::surrogate::{History, Surrogate, Workspace};
+use crate::surrogate::{SofteningHistory, Surrogate, Workspace};
 use harness::output::csv;
 use harness::report::Report;
 use std::path::Path;
@@ -307,7 +307,7 @@ fn look_at_heldout<'a>(laws: &[Named], data: &'a Prepared) -> Result<Vec<Heldout
     for run in data.heldout.iter().flat_map(|set| &set.paths) {
         let mut predicted = Vec::new();
         for Named { law, .. } in laws {
-            let mut history = History::default();
+            let mut history = SofteningHistory::default();
             let mut stress = |row: &Row, memory: &mut _| {
                 law.follow(&row.c, false, &mut history, memory)
                     .map(|answer| row.compared(&answer.stress)[1].into())

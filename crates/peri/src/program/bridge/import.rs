@@ -33,7 +33,7 @@ const NAMES: [(&str, &str); 3] =
 /// A folder that is no export or without steps, a file that is cut off, results that cannot be written.
 pub fn import(folder: &Path, output: &Path) -> Result<Report, Failure> {
     let path = folder.join("model.json");
-    let model: Model = serde_json::from_str(&read_to_string(&path).map_err(Error::io("read", &path))?)
+    let model: Model = serde_json::from_str(&read_to_string(&path).map_err(Error::from_io("read", &path))?)
         .map_err(|error| fault(&path, "model of an export", error.to_string()))?;
     if model.format != "peri-lammps 1" {
         return Err(fault(&path, "model of an export", format!("its format is `{}`", model.format)).into());
@@ -146,7 +146,7 @@ fn numbers(path: &Path, line: &str, between: char) -> Result<Vec<f64>, Error> {
 type Body = (Vec<[f64; 3]>, Vec<[usize; 2]>);
 
 fn read_body(path: &Path) -> Result<Body, Error> {
-    let text = read_to_string(path).map_err(Error::io("read", path))?;
+    let text = read_to_string(path).map_err(Error::from_io("read", path))?;
     let section = |name: &'static str| {
         let mut lines = text.lines().skip_while(move |line| !line.starts_with(name));
         lines.next();
@@ -173,7 +173,7 @@ fn read_body(path: &Path) -> Result<Body, Error> {
 fn read_broken(folder: &Path, count: usize) -> Result<Vec<(u64, usize, usize)>, Error> {
     let mut pairs = Vec::new();
     for path in named(folder, "broken.", ".csv")?.into_values() {
-        for line in read_to_string(&path).map_err(Error::io("read", &path))?.lines() {
+        for line in read_to_string(&path).map_err(Error::from_io("read", &path))?.lines() {
             match numbers(&path, line, ',')?[..] {
                 [step, _, a, b] if (1.0..=count as f64).contains(&a) && (1.0..=count as f64).contains(&b) => {
                     pairs.push((step as u64, a as usize - 1, b as usize - 1));
@@ -193,7 +193,7 @@ fn dumps(folder: &Path) -> Result<BTreeMap<u64, PathBuf>, Error> {
 /// The files PREFIX NUMBER SUFFIX of a folder.
 fn named(folder: &Path, prefix: &str, suffix: &str) -> Result<BTreeMap<u64, PathBuf>, Error> {
     let mut found = BTreeMap::new();
-    for entry in std::fs::read_dir(folder).map_err(Error::io("read", folder))?.flatten() {
+    for entry in std::fs::read_dir(folder).map_err(Error::from_io("read", folder))?.flatten() {
         let name = entry.file_name().to_string_lossy().into_owned();
         let number = name.strip_prefix(prefix).and_then(|rest| rest.strip_suffix(suffix)?.parse().ok());
         found.extend(number.map(|number| (number, entry.path())));
@@ -203,7 +203,7 @@ fn named(folder: &Path, prefix: &str, suffix: &str) -> Result<BTreeMap<u64, Path
 
 /// Places, m, of a dump sorted by id.
 fn read_dump(path: &Path, count: usize) -> Result<Vec<[f64; 3]>, Error> {
-    let text = read_to_string(path).map_err(Error::io("read", path))?;
+    let text = read_to_string(path).map_err(Error::from_io("read", path))?;
     let mut places = Vec::with_capacity(count);
     for line in text.lines().skip(9) {
         match numbers(path, line.trim(), ' ')?[..] {

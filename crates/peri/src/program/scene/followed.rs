@@ -176,7 +176,7 @@ impl FieldSpec {
             format!("the particle at ({}) mm", numbers.join(", "))
         };
         for (index, own) in boxes.iter().enumerate() {
-            if overlap.covered(index) < INSIDE * own.volume() {
+            if overlap.covered_volume(index) < INSIDE * own.volume() {
                 let reason = format!("{} lies outside of the mesh of `{}`", place(index), self.from.input);
                 return Err(refused("placement", format!("{reason}; is it another mesh?")));
             }
@@ -346,7 +346,7 @@ impl FieldSpec {
         let scale = placement.scale.unwrap_or(1.0);
         positive(source, &format!("{key}.scale"), scale, "")?;
         let origin = placement.origin.map_or([0.0; 3], |origin| origin.map(|x| x.si()));
-        let mut whole = Cuboid::around(points);
+        let mut whole = Cuboid::bounding(points);
         if let Some(depth) = placement.depth {
             if D == 3 || depth[0].si() >= depth[1].si() {
                 let found = if D == 3 { "a depth of a solid" } else { "a depth that does not increase" };

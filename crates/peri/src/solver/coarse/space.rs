@@ -5,7 +5,7 @@
 
 use crate::bonds::BodyGeometry;
 use crate::field::Field;
-use polycore::numerics::{Groups, Sets, bounds};
+use polycore::numerics::{DisjointSets, Groups, bounds};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -136,7 +136,7 @@ impl<const D: usize> Filled<D> {
 
     /// Whether a particle lies beside a node.
     fn is_beside(&self, grid: &Grid<D>, node: usize) -> bool {
-        grid.cells_around(node).any(|cell| !self.members.of(cell).is_empty())
+        grid.cells_around(node).any(|cell| !self.members.group(cell).is_empty())
     }
 
     /// Nodes beside a particle: that many functions at least.
@@ -201,7 +201,9 @@ impl<const D: usize> Space<D> {
             .map(|batch| {
                 let mut place = vec![NONE; sites];
                 let window = |node: usize| -> Vec<u32> {
-                    grid.cells_around(node).flat_map(|cell| filled.members.of(cell).iter().copied()).collect()
+                    grid.cells_around(node)
+                        .flat_map(|cell| filled.members.group(cell).iter().copied())
+                        .collect()
                 };
                 let split = |&node: &usize| Some((node, split(bonds, window(node), &mut place)?));
                 batch.iter().filter_map(split).collect()
@@ -224,8 +226,8 @@ impl<const D: usize> Space<D> {
             element_of: vec![NONE; sites],
             local: Field::zeros(0),
         };
-        for cell in (0..cells).filter(|&cell| !filled.members.of(cell).is_empty()) {
-            space.add_cell(grid, cell, filled.members.of(cell), &splits, &first);
+        for cell in (0..cells).filter(|&cell| !filled.members.group(cell).is_empty()) {
+            space.add_cell(grid, cell, filled.members.group(cell), &splits, &first);
         }
         space.local = filled.local;
         space
@@ -299,7 +301,7 @@ fn split<const D: usize>(
     for (index, &site) in window.iter().enumerate() {
         place[site as usize] = index as u32;
     }
-    let mut joined = Sets::new(window.len());
+    let mut joined = DisjointSets::new(window.len());
     let mut parts = window.len();
     // sites far from each other first: few families hold a window together
     let far = |start: usize| (start..window.len()).step_by(STRIDE);

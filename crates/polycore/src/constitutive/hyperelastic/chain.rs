@@ -1,6 +1,6 @@
 //! Langevin chain networks: three chains, eight chains, and eight chains with a √I₂ term.
 
-use super::descriptor::{ABSENT, Contained, Domain, Kind, ModelDescriptor, Parameter, Start, UNLIMITED};
+use super::descriptor::{ABSENT, Contained, Domain, ModelDescriptor, ModelKind, Parameter, Start, UNLIMITED};
 use super::polynomial::{first_invariant_excess, second_invariant_excess};
 use super::principal::InvariantDerivatives;
 use super::{Error, Hyperelastic, PrincipalResponse, finite, parameter, positive};
@@ -36,7 +36,7 @@ const LINKS: &str = "links";
 
 pub(super) const THREE_CHAIN: ModelDescriptor = ModelDescriptor {
     key: "three-chain",
-    kind: Kind::Micromechanical,
+    kind: ModelKind::Micromechanical,
     parameters: &[MODULUS, Parameter { name: LINKS, unit: "1", domain: Domain::Above(largest_square) }],
     build: |p| Ok(Box::new(ThreeChain::new(p[0], p[1])?)),
     example: &[0.3e6, 60.0],
@@ -48,7 +48,7 @@ pub(super) const THREE_CHAIN: ModelDescriptor = ModelDescriptor {
 
 pub(super) const EIGHT_CHAIN: ModelDescriptor = ModelDescriptor {
     key: "eight-chain",
-    kind: Kind::Micromechanical,
+    kind: ModelKind::Micromechanical,
     parameters: &[MODULUS, Parameter { name: LINKS, unit: "1", domain: Domain::Above(chain_square) }],
     build: |p| Ok(Box::new(EightChain::new(p[0], p[1])?)),
     example: &[0.27e6, 25.0],
@@ -60,7 +60,7 @@ pub(super) const EIGHT_CHAIN: ModelDescriptor = ModelDescriptor {
 
 pub(super) const EIGHT_CHAIN_ROOT_I2: ModelDescriptor = ModelDescriptor {
     key: "eight-chain-root-i2",
-    kind: Kind::Micromechanical,
+    kind: ModelKind::Micromechanical,
     parameters: &[
         MODULUS,
         Parameter { name: LINKS, unit: "1", domain: Domain::Above(chain_square) },
@@ -92,7 +92,7 @@ fn largest_square(stretches: [f64; 3]) -> f64 {
 
 /// n must exceed I₁/3.
 fn chain_square(stretches: [f64; 3]) -> f64 {
-    (Invariants::of_stretches(stretches).first / 3.0).max(1.0)
+    (Invariants::from_stretches(stretches).first / 3.0).max(1.0)
 }
 
 fn checked(law: &'static str, modulus: f64, links: f64) -> Result<(f64, f64), Error> {
@@ -191,7 +191,7 @@ impl EightChain {
         Extension::new(&stretches, self.links).ok_or(Error::Locked {
             law: Self::NAME,
             quantity: "chain stretch",
-            value: (Invariants::of_stretches(stretches).first / 3.0).sqrt(),
+            value: (Invariants::from_stretches(stretches).first / 3.0).sqrt(),
             limit: self.links.sqrt(),
         })
     }
@@ -229,7 +229,7 @@ impl Hyperelastic for EightChain {
     }
 
     fn response_at(&self, stretches: [f64; 3]) -> Result<PrincipalResponse, Error> {
-        PrincipalResponse::of_invariants(stretches, self.derivatives(stretches)?)
+        PrincipalResponse::from_invariants(stretches, self.derivatives(stretches)?)
             .finite(Self::NAME, stretches)
     }
 }
@@ -273,13 +273,13 @@ impl Hyperelastic for EightChainRootI2 {
     }
 
     fn response_at(&self, stretches: [f64; 3]) -> Result<PrincipalResponse, Error> {
-        let second = Invariants::of_stretches(stretches).second;
+        let second = Invariants::from_stretches(stretches).second;
         let w = InvariantDerivatives {
             second: 0.5 * self.constraint / second.sqrt(),
             second_second: -0.25 * self.constraint / (second * second.sqrt()),
             ..self.network.derivatives(stretches)?
         };
-        PrincipalResponse::of_invariants(stretches, w).finite(Self::NAME, stretches)
+        PrincipalResponse::from_invariants(stretches, w).finite(Self::NAME, stretches)
     }
 }
 

@@ -22,7 +22,7 @@ pub enum StrainMeasure {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize)]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
-pub enum StressMeasure {
+pub enum TestStressMeasure {
     /// Force over undeformed area, P (PK1, "engineering").
     Nominal,
     /// Force over deformed area, σ = λP.
@@ -48,7 +48,7 @@ pub(super) enum What {
     /// A strain, of which the heading may name the measure.
     Strain(Option<StrainMeasure>),
     /// A stress, of which the heading may name the measure.
-    Stress(Option<StressMeasure>),
+    Stress(Option<TestStressMeasure>),
     /// The name of a test.
     Mode,
     /// A force or a displacement.
@@ -95,7 +95,7 @@ pub(super) const MODES: [&str; 9] = [
 
 impl Role {
     /// Nothing of a heading that is none of these.
-    pub fn of(heading: &Heading) -> Option<Self> {
+    pub fn from_heading(heading: &Heading) -> Option<Self> {
         let (plain, unit) = suffixed(heading);
         let words: Vec<&str> = plain.split(' ').collect();
         let has = |list: &[&str]| words.iter().any(|word| list.contains(word));
@@ -123,8 +123,8 @@ impl Role {
             What::Strain(measure)
         } else if has(&STRESSES) {
             let measure = match (has(&TRUE), has(&NOMINAL)) {
-                (true, _) => Some(StressMeasure::True),
-                (_, true) => Some(StressMeasure::Nominal),
+                (true, _) => Some(TestStressMeasure::True),
+                (_, true) => Some(TestStressMeasure::Nominal),
                 _ => None,
             };
             What::Stress(measure)

@@ -5,11 +5,11 @@ use super::homogeneous::incompressible;
 
 /// A table of homogeneous states.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Table {
+pub struct TestData {
     /// Where the numbers come from: the `# source:` line of the file; empty without one.
     pub source: String,
     /// The states, in the order of the file.
-    pub states: Vec<State>,
+    pub states: Vec<TestState>,
 }
 
 /// The test that a state is of.
@@ -54,7 +54,7 @@ impl Mode {
 
 /// Two principal stretches (λ₃ = 1/(λ₁λ₂)) and their nominal stresses.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct State {
+pub struct TestState {
     /// Its test.
     pub mode: Mode,
     /// λ₁, λ₂.
@@ -63,12 +63,12 @@ pub struct State {
     pub nominal: [f64; 2],
 }
 
-impl Table {
+impl TestData {
     /// The states of one test.
     ///
     /// # Errors
     /// [`Error::Data`] where no stress of it was measured.
-    pub fn of(&self, mode: Mode) -> Result<Self, Error> {
+    pub fn select(&self, mode: Mode) -> Result<Self, Error> {
         let states = self.states.iter().copied().filter(|state| state.mode == mode).collect();
         let table = Self { source: self.source.clone(), states };
         if table.measurements() == 0 {
@@ -84,7 +84,7 @@ impl Table {
     }
 }
 
-impl State {
+impl TestState {
     /// λ₁, λ₂, λ₃.
     ///
     /// # Errors

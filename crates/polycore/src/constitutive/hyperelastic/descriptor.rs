@@ -1,6 +1,6 @@
 //! How a law is named, built from numbers, and started in a fit.
 
-use super::data::Table;
+use super::data::TestData;
 use super::{Error, Hyperelastic};
 
 type Build = fn(&[f64]) -> Result<Box<dyn Hyperelastic>, Error>;
@@ -11,7 +11,7 @@ pub struct ModelDescriptor {
     /// The name in scenes and reports.
     pub key: &'static str,
     /// Where it comes from.
-    pub kind: Kind,
+    pub kind: ModelKind,
     /// Names, units and domains of the parameters.
     pub parameters: &'static [Parameter],
     /// The law with the given parameters, as many as [`ModelDescriptor::parameters`]; see [`ModelDescriptor::law`].
@@ -51,7 +51,7 @@ pub(super) const UNLIMITED: f64 = 1e6;
 
 /// The thesis' two categories of laws (§1.1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum ModelKind {
     /// In invariants or stretches, chosen to fit.
     Phenomenological,
     /// From the statistics of a network of chains.
@@ -65,7 +65,7 @@ pub(super) struct Start<'a> {
     /// The best neo-Hookean modulus, Pa.
     pub modulus: f64,
     /// The data.
-    pub table: &'a Table,
+    pub table: &'a TestData,
     /// Whether the user asks the fit to end.
     pub stop: &'a dyn Fn() -> bool,
 }

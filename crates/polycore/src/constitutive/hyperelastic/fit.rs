@@ -1,7 +1,7 @@
 //! Least-squares fit of a law to homogeneous states.
 //!
 //! Minimised is the sum of squares of the nominal-stress residuals, over every stress of the table that was measured
-//! (is not exactly zero; [`super::data::State::nominal`]). The figure of merit, `rms`, is the root of its mean.
+//! (is not exactly zero; [`super::data::TestState::nominal`]). The figure of merit, `rms`, is the root of its mean.
 //! Levenberg–Marquardt in transformed parameters (ln p for positive ones, ln(p/limit − 1) for locking limits) keeps
 //! every iterate in the law's domain; several starts guard against local minima.
 
@@ -9,12 +9,12 @@ use std::cell::Cell;
 
 use nalgebra::DVector;
 
-use super::data::Table;
+use super::data::TestData;
 use super::descriptor::Start;
+pub use super::fit_map::{Identifiability, residuals};
 use super::fit_map::{Map, REJECTED};
-pub use super::fit_map::{Standing, residuals};
 use super::{Error, Hyperelastic, ModelDescriptor, homogeneous};
-use crate::numerics::least_squares::{Found, levenberg_marquardt};
+use crate::numerics::least_squares::{Optimum, levenberg_marquardt};
 
 /// A fitted law.
 pub struct Fit {
@@ -23,7 +23,7 @@ pub struct Fit {
     /// Its model.
     pub model: &'static ModelDescriptor,
     /// Its parameters.
-    pub parameters: Vec<Fitted>,
+    pub parameters: Vec<FittedParameter>,
     /// Root mean square of the residuals over the measured stresses, Pa.
     pub rms: f64,
     /// Draws of all parameters from their posterior ([`crate::posterior`]); those that the data do not determine stay at their
@@ -39,7 +39,7 @@ pub struct Fit {
 
 /// A fitted parameter.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Fitted {
+pub struct FittedParameter {
     /// Its name.
     pub name: &'static str,
     /// `Pa` or `1`.
@@ -50,14 +50,14 @@ pub struct Fitted {
     /// an end of its domain, which for a locking limit is 1e6 × the least value allowed.
     pub standard_error: Option<f64>,
     /// Whether the data say anything of it.
-    pub standing: Standing,
+    pub identifiability: Identifiability,
 }
 
 /// Root mean square of [`residuals`], Pa.
 ///
 /// # Errors
 /// As [`residuals`].
-pub fn rms<L: Hyperelastic + ?Sized>(law: &L, table: &Table) -> Result<f64, Error> {
+pub fn rms<L: Hyperelastic + ?Sized>(law: &L, table: &TestData) -> Result<f64, Error> {
     let residuals = residuals(law, table)?;
     Ok((residuals.iter().map(|r| r * r).sum::<f64>() / residuals.len() as f64).sqrt())
 }
@@ -78,7 +78,7 @@ impl Agreement {
     ///
     /// # Errors
     /// As [`residuals`]: at a state beyond locking there is no stress to compare.
-    pub fn of<L: Hyperelastic + ?Sized>(law: &L, table: &Table) -> Result<Self, Error> {
+    pub fn new<L: Hyperelastic + ?Sized>(law: &L, table: &TestData) -> Result<Self, Error> {
         let residuals = residuals(law, table)?;
         let count = residuals.len() as f64;
         let measured = || table.states.iter().flat_map(|state| state.nominal).filter(|data| *data != 0.0);
@@ -98,7 +98,7 @@ impl Agreement {
 /// # Errors
 /// [`Error::Data`] if the table has fewer measurements than the law has parameters, or a mean stiffness below zero;
 /// [`Error::NoConvergence`] if no start arrives anywhere.
-pub fn fit(model: &'static ModelDescriptor, table: &Table) -> Result<Fit, Error> {
+pub fn fit(model: &'static ModelDescriptor, table: &TestData) -> Result<Fit, Error> {
     fit_until(model, table, &|| false)
 }
 
@@ -108,7 +108,7 @@ pub fn fit(model: &'static ModelDescriptor, table: &Table) -> Result<Fit, Error>
 /// As [`fit`]; [`Error::Stopped`].
 pub fn fit_until(
     model: &'static ModelDescriptor,
-    table: &Table,
+    table: &TestData,
     stop: &dyn Fn() -> bool,
 ) -> Result<Fit, Error> {
     let measurements = table.measurements();
@@ -151,7 +151,7 @@ pub fn fit_until(
     let search = |from: &[f64], ends: &mut Vec<(f64, DVector<f64>)>| {
         // nothing ends the search
         let jacobian = |q: &DVector<f64>| if stop() { None } else { map.jacobian(q, table) };
-        let Found { at, objective } = levenberg_marquardt(map.inverse(from), 200, residuals, jacobian);
+        let Optimum { at, objective } = levenberg_marquardt(map.inverse(from), 200, residuals, jacobian);
         if objective < REJECTED && map.residuals(&at, table).is_some() {
             ends.push((objective, at));
         }
@@ -191,12 +191,12 @@ pub fn fit_until(
         .iter()
         .zip(values)
         .enumerate()
-        .map(|(i, (parameter, value))| Fitted {
+        .map(|(i, (parameter, value))| FittedParameter {
             name: parameter.name,
             unit: parameter.unit,
             value,
             standard_error: found.errors[i],
-            standing: found.standings[i],
+            identifiability: found.identifiability[i],
         })
         .collect();
     let starts = (starts.len(), agreeing.min(starts.len()));
@@ -208,7 +208,7 @@ pub fn fit_until(
 ///
 /// # Errors
 /// [`Error::Data`] where it is not above zero.
-pub fn neo_hookean_modulus(table: &Table) -> Result<f64, Error> {
+pub fn neo_hookean_modulus(table: &TestData) -> Result<f64, Error> {
     let unit = super::NeoHookean::new(1.0)?;
     let (mut model_data, mut model_model) = (0.0, 0.0);
     for state in &table.states {

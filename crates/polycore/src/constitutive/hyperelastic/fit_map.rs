@@ -2,13 +2,13 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::data::{State, Table};
+use super::data::{TestData, TestState};
 use super::descriptor::UNLIMITED;
 use super::{Domain, Error, Hyperelastic, ModelDescriptor, homogeneous};
 
 /// What data say of a fitted parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Standing {
+pub enum Identifiability {
     /// They determine it.
     Determined,
     /// A modulus without any effect on the stresses, or the exponent of such a term: the term is absent.
@@ -21,7 +21,7 @@ pub enum Standing {
 ///
 /// # Errors
 /// What the law refuses at a state of the table.
-pub fn residuals<L: Hyperelastic + ?Sized>(law: &L, table: &Table) -> Result<Vec<f64>, Error> {
+pub fn residuals<L: Hyperelastic + ?Sized>(law: &L, table: &TestData) -> Result<Vec<f64>, Error> {
     let mut residuals = Vec::with_capacity(2 * table.states.len());
     for state in &table.states {
         let nominal = homogeneous::biaxial(law, state.stretches[0], state.stretches[1])?;
@@ -39,16 +39,16 @@ pub(super) struct Uncertainty {
     /// Standard errors.
     pub errors: Vec<Option<f64>>,
     /// Whether parameters are determined.
-    pub standings: Vec<Standing>,
+    pub identifiability: Vec<Identifiability>,
     /// Draws of all parameters.
     pub draws: Vec<Vec<f64>>,
 }
 
 /// Axis, state and computed stresses of each measured stress, state by state.
 fn measured<'a>(
-    table: &'a Table,
-    mut nominal: impl FnMut(&State) -> [f64; 2] + 'a,
-) -> impl Iterator<Item = (usize, &'a State, [f64; 2])> + 'a {
+    table: &'a TestData,
+    mut nominal: impl FnMut(&TestState) -> [f64; 2] + 'a,
+) -> impl Iterator<Item = (usize, &'a TestState, [f64; 2])> + 'a {
     table.states.iter().flat_map(move |state| {
         let found = nominal(state);
         (0..2).filter(|&axis| state.nominal[axis] != 0.0).map(move |axis| (axis, state, found))
@@ -67,7 +67,7 @@ pub(super) struct Map<'a> {
 const FARTHEST: f64 = 40.0;
 
 impl<'a> Map<'a> {
-    pub fn new(model: &'a ModelDescriptor, table: &Table, modulus: f64) -> Result<Self, Error> {
+    pub fn new(model: &'a ModelDescriptor, table: &TestData, modulus: f64) -> Result<Self, Error> {
         let mut limits = Vec::new();
         for parameter in model.parameters {
             limits.push(match parameter.domain {
@@ -116,7 +116,7 @@ impl<'a> Map<'a> {
     }
 
     /// Residuals in units of the modulus.
-    pub fn residuals(&self, q: &DVector<f64>, table: &Table) -> Option<DVector<f64>> {
+    pub fn residuals(&self, q: &DVector<f64>, table: &TestData) -> Option<DVector<f64>> {
         let p = self.parameters(q);
         let residuals = match self.model.slopes {
             Some(slopes) => {
@@ -132,7 +132,7 @@ impl<'a> Map<'a> {
     }
 
     /// dr/dq, in closed form or by central differences of step ∛ε, good to 1e-10.
-    pub(super) fn jacobian(&self, q: &DVector<f64>, table: &Table) -> Option<DMatrix<f64>> {
+    pub(super) fn jacobian(&self, q: &DVector<f64>, table: &TestData) -> Option<DMatrix<f64>> {
         if let Some(slopes) = self.model.slopes {
             let values: Vec<(f64, f64)> = (0..q.len()).map(|i| self.value(i, q[i])).collect();
             let p: Vec<f64> = values.iter().map(|value| value.0).collect();
@@ -164,10 +164,10 @@ impl<'a> Map<'a> {
 
     /// What the data say of the parameters. Without standard errors are those that the residuals do not depend on, and all if the
     /// rest are collinear.
-    pub fn uncertainty(&self, q: &DVector<f64>, table: &Table) -> Uncertainty {
+    pub fn uncertainty(&self, q: &DVector<f64>, table: &TestData) -> Uncertainty {
         let mut found = Uncertainty {
             errors: vec![None; q.len()],
-            standings: vec![Standing::Determined; q.len()],
+            identifiability: vec![Identifiability::Determined; q.len()],
             draws: Vec::new(),
         };
         let effects =
@@ -177,14 +177,18 @@ impl<'a> Map<'a> {
             let parameter = &self.model.parameters[i];
             let modulus = matches!(parameter.domain, Domain::Positive) && parameter.unit == "Pa";
             let unlimited = matches!(parameter.domain, Domain::Above(_)) && q[i].exp() > 0.1 * UNLIMITED;
-            found.standings[i] = match modulus {
-                true if *effect <= EFFECT => Standing::Absent,
+            found.identifiability[i] = match modulus {
+                true if *effect <= EFFECT => Identifiability::Absent,
                 // the exponent of a term that is absent
-                false if *effect <= EFFECT && i > 0 && found.standings[i - 1] == Standing::Absent => {
-                    Standing::Absent
+                false
+                    if *effect <= EFFECT
+                        && i > 0
+                        && found.identifiability[i - 1] == Identifiability::Absent =>
+                {
+                    Identifiability::Absent
                 }
-                false if *effect <= EFFECT || unlimited => Standing::Undetermined,
-                _ => Standing::Determined,
+                false if *effect <= EFFECT || unlimited => Identifiability::Undetermined,
+                _ => Identifiability::Determined,
             };
         }
         let Some((live, covariance, degrees)) = self.covariance(q, table) else {
@@ -205,7 +209,7 @@ impl<'a> Map<'a> {
     }
 
     /// The q that the residuals determine, their covariance s²(JᵀJ)⁻¹ and the degrees of freedom.
-    fn covariance(&self, q: &DVector<f64>, table: &Table) -> Option<(Vec<usize>, DMatrix<f64>, usize)> {
+    fn covariance(&self, q: &DVector<f64>, table: &TestData) -> Option<(Vec<usize>, DMatrix<f64>, usize)> {
         let (residuals, jacobian) = (self.residuals(q, table)?, self.jacobian(q, table)?);
         let norms: Vec<f64> = jacobian.column_iter().map(|column| column.norm()).collect();
         let live: Vec<usize> = (0..q.len()).filter(|&i| norms[i] > EFFECT).collect();

@@ -1,6 +1,6 @@
 //! Ogden's law in powers of the principal stretches.
 
-use super::descriptor::{Contained, Domain, Kind, ModelDescriptor, Parameter};
+use super::descriptor::{Contained, Domain, ModelDescriptor, ModelKind, Parameter};
 use super::ogden_project::projected;
 use super::{Error, Hyperelastic, PrincipalResponse, finite, ogden_starts, parameter, positive};
 
@@ -49,7 +49,7 @@ fn build(p: &[f64]) -> Result<Box<dyn Hyperelastic>, Error> {
 
 pub(super) const OGDEN_1: ModelDescriptor = ModelDescriptor {
     key: "ogden-1",
-    kind: Kind::Phenomenological,
+    kind: ModelKind::Phenomenological,
     parameters: PARAMETERS.as_flattened().split_at(2).0,
     build,
     example: &[0.4e6, 2.2],
@@ -61,7 +61,7 @@ pub(super) const OGDEN_1: ModelDescriptor = ModelDescriptor {
 
 pub(super) const OGDEN_2: ModelDescriptor = ModelDescriptor {
     key: "ogden-2",
-    kind: Kind::Phenomenological,
+    kind: ModelKind::Phenomenological,
     parameters: PARAMETERS.as_flattened().split_at(4).0,
     build,
     example: &[0.4e6, 1.3, 2e3, 5.0],
@@ -76,7 +76,7 @@ pub(super) const OGDEN_2: ModelDescriptor = ModelDescriptor {
 
 pub(super) const OGDEN_3: ModelDescriptor = ModelDescriptor {
     key: "ogden-3",
-    kind: Kind::Phenomenological,
+    kind: ModelKind::Phenomenological,
     parameters: PARAMETERS.as_flattened(),
     build,
     // Ogden's own values for Treloar's rubber (1.3, 5.0, −2.0; 0.63, 0.0012, −0.01 MPa), as μᵢαᵢ/2

@@ -51,7 +51,7 @@ impl PrincipalResponse {
     }
 
     /// W(I₁, I₂) without a mixed derivative. The shear quotient is −2 ∂W/∂I₂ exactly.
-    pub(super) fn of_invariants(stretches: [f64; 3], w: InvariantDerivatives) -> Self {
+    pub(super) fn from_invariants(stretches: [f64; 3], w: InvariantDerivatives) -> Self {
         let [a, b, c] = stretches.map(|l| l * l);
         let others = [b + c, c + a, a + b];
         Self {

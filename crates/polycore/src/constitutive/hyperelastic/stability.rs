@@ -1,6 +1,6 @@
 //! Whether a law stiffens against every further strain (Drucker), where tests have been and beyond.
 
-use super::data::{Mode, Table};
+use super::data::{Mode, TestData};
 use super::{Hyperelastic, homogeneous};
 
 /// Steps of a scan from rest to the end of a range.
@@ -9,7 +9,7 @@ const STEPS: usize = 200;
 const STEP: f64 = 1e-5;
 
 /// Least and largest first stretch of a table, 1 included.
-pub fn range(table: &Table) -> [f64; 2] {
+pub fn range(table: &TestData) -> [f64; 2] {
     let stretches = table.states.iter().map(|state| state.stretches[0]);
     stretches.fold([1.0, 1.0], |[low, high], l| [l.min(low), l.max(high)])
 }

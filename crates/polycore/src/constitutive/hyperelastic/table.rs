@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use super::Error;
-use super::columns::{MODES, Role, StrainMeasure, StressMeasure, What, mode};
-use super::data::{Mode, State, Table};
+use super::columns::{MODES, Role, StrainMeasure, TestStressMeasure, What, mode};
+use super::data::{Mode, TestData, TestState};
 use super::plausible::{Row, plausible};
 use crate::table::{self, plain_unit, plainly};
 use crate::units::Unit;
@@ -12,13 +12,13 @@ use crate::units::dimension::{RatioDimension, StressDimension};
 
 /// What the headings of a table leave open.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Meaning {
+pub struct TestFormat {
     /// The test of all rows, where no column names it.
     pub mode: Option<Mode>,
     /// Measure of the strain.
     pub strain: Option<StrainMeasure>,
     /// Measure of the stress.
-    pub stress: Option<StressMeasure>,
+    pub stress: Option<TestStressMeasure>,
     /// Unit of a stress without one.
     pub stress_unit: Option<String>,
     /// Heading of the strain, of several.
@@ -29,30 +29,30 @@ pub struct Meaning {
 
 /// A table that was read.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Reading {
+pub struct ImportedTest {
     /// Its states.
-    pub table: Table,
+    pub table: TestData,
     /// One line: how the file was understood.
-    pub understood: String,
+    pub description: String,
     /// What was left out or turned round, a line each.
     pub notes: Vec<String>,
 }
 
-impl Table {
-    /// Reads a file; see [`Table::read_as`].
+impl TestData {
+    /// Reads a file; see [`TestData::read_as`].
     ///
     /// # Errors
-    /// As [`Table::read_as`].
+    /// As [`TestData::read_as`].
     pub fn read(path: impl AsRef<Path>) -> Result<Self, crate::Error> {
-        Self::read_as(path, &Meaning::default()).map(|reading| reading.table)
+        Self::read_as(path, &TestFormat::default()).map(|reading| reading.table)
     }
 
-    /// Reads a text; see [`Table::read_as`].
+    /// Reads a text; see [`TestData::read_as`].
     ///
     /// # Errors
-    /// As [`Table::read_as`].
+    /// As [`TestData::read_as`].
     pub fn parse(name: &str, text: &str) -> Result<Self, Error> {
-        Self::parse_as(name, text.as_bytes().to_vec(), &Meaning::default()).map(|reading| reading.table)
+        Self::parse_as(name, text.as_bytes().to_vec(), &TestFormat::default()).map(|reading| reading.table)
     }
 
     /// Reads a table as [`crate::table`] does: a column of stretches or strains and one of stresses, with a column of the
@@ -60,20 +60,20 @@ impl Table {
     /// one and a stress a nominal one where neither heading nor `meaning` says more. Blank stresses were not measured.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], and what [`Table::parse_as`] refuses.
-    pub fn read_as(path: impl AsRef<Path>, meaning: &Meaning) -> Result<Reading, crate::Error> {
+    /// [`crate::Error::Io`], and what [`TestData::parse_as`] refuses.
+    pub fn read_as(path: impl AsRef<Path>, meaning: &TestFormat) -> Result<ImportedTest, crate::Error> {
         let path = path.as_ref();
-        let bytes = std::fs::read(path).map_err(crate::Error::io("read", path))?;
+        let bytes = std::fs::read(path).map_err(crate::Error::from_io("read", path))?;
         Ok(Self::parse_as(&path.display().to_string(), bytes, meaning)?)
     }
 
-    /// As [`Table::read_as`], of what a file holds.
+    /// As [`TestData::read_as`], of what a file holds.
     ///
     /// # Errors
     /// [`Error::Data`] with line and column: headings, units and modes that are not known or leave several possibilities,
     /// what is no number, a stretch that is not positive, strains that look like stretches or the other way round, a
     /// stiffness below zero, no measurement at all.
-    pub fn parse_as(name: &str, bytes: Vec<u8>, meaning: &Meaning) -> Result<Reading, Error> {
+    pub fn parse_as(name: &str, bytes: Vec<u8>, meaning: &TestFormat) -> Result<ImportedTest, Error> {
         let file = table::Table::parse(name, bytes).map_err(located)?;
         let columns = Columns::of(&file, meaning).map_err(located)?;
         columns.read(&file, meaning).map_err(located)
@@ -102,15 +102,15 @@ struct Chosen<M> {
 struct Columns {
     mode: Option<usize>,
     strains: Vec<Chosen<StrainMeasure>>,
-    stresses: Vec<Chosen<StressMeasure>>,
+    stresses: Vec<Chosen<TestStressMeasure>>,
 }
 
 const LAYOUTS: &str = "a strain (`stretch`, `strain [%]`) and a stress (`nominal [MPa]`), with a `mode` in each row if there are \
                        several tests, or `stretch_1`, `stretch_2`, `nominal_1 [MPa]`, `nominal_2 [MPa]`";
 
 impl Columns {
-    fn of(file: &table::Table, meaning: &Meaning) -> Result<Self, table::Error> {
-        let roles: Vec<Option<Role>> = file.headings.iter().map(Role::of).collect();
+    fn of(file: &table::Table, meaning: &TestFormat) -> Result<Self, table::Error> {
+        let roles: Vec<Option<Role>> = file.headings.iter().map(Role::from_heading).collect();
         let strain = |what: What| if let What::Strain(measure) = what { Some(measure) } else { None };
         let stress = |what: What| if let What::Stress(measure) = what { Some(measure) } else { None };
         let mut strains = Vec::new();
@@ -159,13 +159,13 @@ impl Columns {
                     name: meaning.stress_column.as_deref(),
                     measure: meaning.stress,
                     of: &stress,
-                    order: &[StressMeasure::Nominal, StressMeasure::True],
-                    assumed: StressMeasure::Nominal,
+                    order: &[TestStressMeasure::Nominal, TestStressMeasure::True],
+                    assumed: TestStressMeasure::Nominal,
                 },
             )?);
         }
         let (first, other) = (&strains[0], &stresses[0]);
-        if first.assumed && other.measure == StressMeasure::True && !other.assumed {
+        if first.assumed && other.measure == TestStressMeasure::True && !other.assumed {
             let allowed = "`strain = \"engineering\"` or `strain = \"true\"` in the data's entry: the stress is a true one";
             return Err(file.refuse_headings(allowed));
         }
@@ -183,8 +183,8 @@ impl Columns {
         Ok(Self { mode, strains, stresses })
     }
 
-    fn read(&self, file: &table::Table, meaning: &Meaning) -> Result<Reading, table::Error> {
-        let unit = |chosen: &Chosen<StressMeasure>| {
+    fn read(&self, file: &table::Table, meaning: &TestFormat) -> Result<ImportedTest, table::Error> {
+        let unit = |chosen: &Chosen<TestStressMeasure>| {
             let text = chosen.unit.as_deref().or(meaning.stress_unit.as_deref()).unwrap_or_default();
             Unit::<StressDimension>::parse(&plain_unit(text)).map_err(|error| {
                 let what = format!("unit of column {}, `{}`", chosen.column + 1, file.headings[chosen.column].text);
@@ -229,7 +229,7 @@ impl Columns {
             let mut measured = 0;
             for (axis, (chosen, unit)) in self.stresses.iter().zip(&units).enumerate() {
                 let Some(number) = file.number_or_blank(index, chosen.column)? else { continue };
-                let si = unit.of(number).map(|stress| stress.si());
+                let si = unit.quantity(number).map(|stress| stress.si());
                 row.nominal[axis] =
                     si.map_err(|error| file.refuse_cell(index, chosen.column, &error.to_string()))?;
                 measured += 1;
@@ -240,7 +240,7 @@ impl Columns {
             }
             for (axis, (chosen, ratio)) in self.strains.iter().zip(&ratios).enumerate() {
                 let number = file.number(index, chosen.column)?;
-                row.written[axis] = ratio.of(number).map_or(number, |ratio| ratio.si());
+                row.written[axis] = ratio.quantity(number).map_or(number, |ratio| ratio.si());
             }
             rows.push(row);
         }
@@ -272,7 +272,7 @@ impl Columns {
                 row.stretches[1] = row.mode.second_stretch(row.stretches[0]);
             }
             for (axis, chosen) in self.stresses.iter().enumerate() {
-                if chosen.measure == StressMeasure::True {
+                if chosen.measure == TestStressMeasure::True {
                     // J = 1: σ = λP
                     row.nominal[axis] /= row.stretches[axis];
                 }
@@ -284,9 +284,9 @@ impl Columns {
             plausible(&mut rows, &mut notes, chosen.measure, said, chosen.unit.is_some())
                 .map_err(|(row, allowed)| file.refuse_cell(row, chosen.column, &allowed))?;
         }
-        let state = |row: &Row| State { mode: row.mode, stretches: row.stretches, nominal: row.nominal };
+        let state = |row: &Row| TestState { mode: row.mode, stretches: row.stretches, nominal: row.nominal };
         let source = file.remark("# source:").unwrap_or_default().to_owned();
-        let table = Table { source, states: rows.iter().map(state).collect() };
+        let table = TestData { source, states: rows.iter().map(state).collect() };
         if table.measurements() == 0 {
             let found = format!("{} rows", file.rows());
             return Err(file.refuse(
@@ -296,11 +296,16 @@ impl Columns {
                 "at least one row; it contains no stress other than zero",
             ));
         }
-        Ok(Reading { understood: self.understood(file, &table), table, notes })
+        Ok(ImportedTest { description: self.describe(file, &table), table, notes })
     }
 
     /// The test of a row, and whether it is compression.
-    fn test(&self, file: &table::Table, row: usize, meaning: &Meaning) -> Result<(Mode, bool), table::Error> {
+    fn test(
+        &self,
+        file: &table::Table,
+        row: usize,
+        meaning: &TestFormat,
+    ) -> Result<(Mode, bool), table::Error> {
         let Some(column) = self.mode else {
             let one = meaning.mode.unwrap_or(Mode::Uniaxial);
             return Ok((if self.strains.len() == 2 { Mode::Biaxial } else { one }, false));
@@ -333,7 +338,7 @@ impl Columns {
         }
     }
 
-    fn understood(&self, file: &table::Table, table: &Table) -> String {
+    fn describe(&self, file: &table::Table, table: &TestData) -> String {
         let used: Vec<usize> =
             self.mode.into_iter().chain(self.strains.iter().map(|chosen| chosen.column)).collect();
         let used: Vec<usize> =
@@ -344,8 +349,8 @@ impl Columns {
             StrainMeasure::True => "true strain",
         };
         let stress = match self.stresses[0].measure {
-            StressMeasure::Nominal => "nominal stress",
-            StressMeasure::True => "true stress",
+            TestStressMeasure::Nominal => "nominal stress",
+            TestStressMeasure::True => "true stress",
         };
         let biaxial = if self.strains.len() == 2 { "biaxial, " } else { "" };
         let assumed = match (self.strains[0].assumed, self.stresses[0].assumed) {
@@ -360,7 +365,7 @@ impl Columns {
             stretches.fold((f64::INFINITY, 0.0_f64), |(low, high), l| (low.min(l), high.max(l)));
         format!(
             "{}; {biaxial}{strain} and {stress}{assumed}; stretches {low:.4} to {high:.4}",
-            file.understood(&used)
+            file.describe(&used)
         )
     }
 }

@@ -1,6 +1,6 @@
 //! Yeoh's law, the reduced polynomial of third order.
 
-use super::descriptor::{Contained, Domain, Kind, ModelDescriptor, Parameter};
+use super::descriptor::{Contained, Domain, ModelDescriptor, ModelKind, Parameter};
 use super::polynomial::first_invariant_excess;
 use super::principal::InvariantDerivatives;
 use super::{Error, Hyperelastic, PrincipalResponse, finite, parameter, positive};
@@ -13,7 +13,7 @@ pub struct Yeoh {
 
 pub(super) const YEOH: ModelDescriptor = ModelDescriptor {
     key: "yeoh",
-    kind: Kind::Phenomenological,
+    kind: ModelKind::Phenomenological,
     parameters: &[
         Parameter { name: "C1", unit: "Pa", domain: Domain::Positive },
         Parameter { name: "C2", unit: "Pa", domain: Domain::Real },
@@ -69,6 +69,6 @@ impl Hyperelastic for Yeoh {
             first_first: 2.0 * b + 6.0 * c * x,
             ..Default::default()
         };
-        PrincipalResponse::of_invariants(stretches, w).finite(Self::NAME, stretches)
+        PrincipalResponse::from_invariants(stretches, w).finite(Self::NAME, stretches)
     }
 }

@@ -1,6 +1,6 @@
 //! From C to a prediction: members, their mean, lists of points.
 
-use super::{Kind, Memory, Prediction, Rest, Surrogate, Workspace, back, product};
+use super::{Kind, Memory, Prediction, RestTerm, Surrogate, Workspace, back, product};
 use crate::constitutive::Error;
 use crate::constitutive::law::same_length;
 use crate::constitutive::network::{BATCH, LANES, Real, Tape};
@@ -197,7 +197,7 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         &self,
         m: usize,
         c: &[T; 6],
-        rest: &Rest<T>,
+        rest: &RestTerm<T>,
         tangent: bool,
         tape: &mut Tape<T>,
     ) -> Member<T> {
@@ -256,7 +256,7 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
     fn energetic(
         &self,
         local: &[T; 6],
-        rest: &Rest<T>,
+        rest: &RestTerm<T>,
         value: T,
         gradient: &[T; LANES],
         hessian: Option<&[[T; LANES]; LANES]>,

@@ -35,11 +35,11 @@ impl Surrogate<f64> {
     /// architecture of the header; I/O errors.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, crate::Error> {
         let path = path.as_ref();
-        let size = std::fs::metadata(path).map_err(crate::Error::io("read", path))?.len();
+        let size = std::fs::metadata(path).map_err(crate::Error::from_io("read", path))?.len();
         if size > LARGEST {
             return Err(Error::file(path, format!("{size} bytes"), "laws up to 4 GiB").into());
         }
-        let bytes = std::fs::read(path).map_err(crate::Error::io("read", path))?;
+        let bytes = std::fs::read(path).map_err(crate::Error::from_io("read", path))?;
         Ok(Self::decode(&bytes).map_err(|(found, allowed)| Error::file(path, found, allowed))?)
     }
 
@@ -145,7 +145,7 @@ mod tests {
     fn law() -> Vec<u8> {
         let kind = Kind::polyconvex_energy(Symmetry::Transverse);
         let mut header = Header::new(kind, &[(3, Softplus), (2, Softplus)], 2);
-        header.support = Some(Support::of(&[Voigt::repeat(1.0), Voigt::repeat(2.0)], 2).unwrap());
+        header.support = Some(Support::from_rows(&[Voigt::repeat(1.0), Voigt::repeat(2.0)], 2).unwrap());
         header.spread_limit = Some(1e6);
         Surrogate::random(header, 3).unwrap().to_bytes().unwrap()
     }

@@ -26,7 +26,7 @@ pub struct Softening {
 
 /// What a point has seen.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct History {
+pub struct SofteningHistory {
     /// m: the greatest W, J/m³; 0 at first.
     pub greatest: f64,
 }
@@ -47,7 +47,7 @@ impl Softening {
     }
 
     /// d and ∂d/∂W at an energy W below the greatest of the history.
-    pub fn damage(&self, energy: f64, history: History) -> [f64; 2] {
+    pub fn damage(&self, energy: f64, history: SofteningHistory) -> [f64; 2] {
         let most = history.greatest;
         if energy >= most {
             return [0.0; 2];
@@ -85,7 +85,7 @@ impl Surrogate<f64> {
         &self,
         c: &Voigt,
         tangent: bool,
-        history: &mut History,
+        history: &mut SofteningHistory,
         memory: &mut Workspace,
     ) -> Result<Prediction, Error> {
         let mut answer = if tangent { Law::tangent(self, c, memory) } else { Law::stress(self, c, memory) }?;
@@ -125,7 +125,7 @@ mod tests {
     /// greatest energy follows one curve.
     #[test]
     fn unloads_below_the_curve_of_loading() {
-        let (law, mut memory, mut history) = (law(), Workspace::default(), History::default());
+        let (law, mut memory, mut history) = (law(), Workspace::default(), SofteningHistory::default());
         let stretches =
             |from: f64, to: f64| (0..=200).map(move |k| from + (to - from) * f64::from(k) / 200.0);
         for stretch in stretches(1.0, 1.3) {
@@ -144,18 +144,21 @@ mod tests {
             assert!((again - down).norm() <= 1e-9 * down.norm(), "{stretch}");
         }
         // the same point after more: more damage
-        let [before, _] = law.header().softening.as_ref().unwrap().damage(1e4, History { greatest: 2e4 });
-        let [after, _] = law.header().softening.as_ref().unwrap().damage(1e4, History { greatest: 3e4 });
+        let [before, _] =
+            law.header().softening.as_ref().unwrap().damage(1e4, SofteningHistory { greatest: 2e4 });
+        let [after, _] =
+            law.header().softening.as_ref().unwrap().damage(1e4, SofteningHistory { greatest: 3e4 });
         assert!(0.0 < before && before < after && after < 1.0);
         let far = Softening { units: vec![[1e3, 20.0, 80.0]], greatest: 1.0 };
-        assert_eq!(far.damage(1e5, History { greatest: 1e6 }).map(f64::abs), [1.0, 0.0]);
+        assert_eq!(far.damage(1e5, SofteningHistory { greatest: 1e6 }).map(f64::abs), [1.0, 0.0]);
     }
 
     /// Against central differences of S, 2 ∂S/∂C, on unloading.
     #[test]
     fn tangent_of_unloading() {
         let (law, mut memory) = (law(), Workspace::default());
-        let mut history = History { greatest: law.stress(&at(1.3), &mut memory).unwrap().energy.unwrap() };
+        let mut history =
+            SofteningHistory { greatest: law.stress(&at(1.3), &mut memory).unwrap().energy.unwrap() };
         let c = at(1.1);
         let tangent = law.follow(&c, true, &mut history, &mut memory).unwrap().tangent.unwrap();
         for b in 0..6 {

@@ -12,7 +12,7 @@ use pulp::{Arch, Simd, WithSimd};
 use serde::{Deserialize, Serialize};
 
 /// Most representatives that a law may have.
-pub const MOST: usize = 4096;
+pub const MOST_REPRESENTATIVES: usize = 4096;
 
 /// Representatives looked at side by side.
 const BLOCK: usize = 16;
@@ -35,9 +35,9 @@ impl Support {
     ///
     /// # Errors
     /// [`Error::Invalid`] for no rows, rows that are not finite, or `most` outside of 1 to 4096.
-    pub fn of(rows: &[Voigt], most: usize) -> Result<Self, Error> {
-        if !(1..=MOST).contains(&most) {
-            return Err(Error::invalid("representatives", most, format!("1 to {MOST}")));
+    pub fn from_rows(rows: &[Voigt], most: usize) -> Result<Self, Error> {
+        if !(1..=MOST_REPRESENTATIVES).contains(&most) {
+            return Err(Error::invalid("representatives", most, format!("1 to {MOST_REPRESENTATIVES}")));
         }
         if let Some(row) = rows.iter().find(|row| !row.iter().all(|c| c.is_finite())) {
             return Err(Error::invalid("C", format!("{:?}", row.as_slice()), "finite components"));
@@ -89,8 +89,12 @@ impl Support {
     /// # Errors
     /// [`Error::Invalid`] for no or too many representatives, or numbers that are not finite.
     pub fn check(&self) -> Result<(), Error> {
-        if !(1..=MOST).contains(&self.points.len()) {
-            return Err(Error::invalid("representatives", self.points.len(), format!("1 to {MOST}")));
+        if !(1..=MOST_REPRESENTATIVES).contains(&self.points.len()) {
+            return Err(Error::invalid(
+                "representatives",
+                self.points.len(),
+                format!("1 to {MOST_REPRESENTATIVES}"),
+            ));
         }
         let numbers = self.points.as_flattened().iter().chain(&self.weights).chain([&self.radius]);
         if let Some(bad) = numbers.clone().find(|value| !value.is_finite()) {
@@ -200,7 +204,7 @@ mod tests {
             )
         };
         let rows: Vec<Voigt> = (0..202).map(row).collect();
-        let support = Support::of(&rows, 40).unwrap();
+        let support = Support::from_rows(&rows, 40).unwrap();
         assert_eq!((support.points.len(), support.weights[2]), (40, 0.0));
         let nearest = Nearest::<f64>::new(&support);
         let brute = |c: &Voigt| {
@@ -216,11 +220,11 @@ mod tests {
         let gap = Voigt::new(1.9, 1.9, 1.0, 0.0, 0.0, 0.0);
         assert!(nearest.distance(&gap.into()) > 5.0 * support.radius);
         // more representatives than rows: rows 0.01 apart, in deviations of √2/100
-        let few = Support::of(&rows[..5], 100).unwrap();
+        let few = Support::from_rows(&rows[..5], 100).unwrap();
         assert!(few.points.len() == 5 && (few.radius - 0.5f64.sqrt()).abs() < 1e-9);
-        assert_eq!(Support::of(&rows[..1], 100).unwrap().radius, 0.0);
-        assert!(Support::of(&[], 3).is_err() && Support::of(&rows, 0).is_err());
-        assert!(Support::of(&[Voigt::repeat(f64::NAN)], 3).is_err());
+        assert_eq!(Support::from_rows(&rows[..1], 100).unwrap().radius, 0.0);
+        assert!(Support::from_rows(&[], 3).is_err() && Support::from_rows(&rows, 0).is_err());
+        assert!(Support::from_rows(&[Voigt::repeat(f64::NAN)], 3).is_err());
         for bad in [
             Support { points: vec![], ..support.clone() },
             Support { radius: f64::NAN, ..support.clone() },

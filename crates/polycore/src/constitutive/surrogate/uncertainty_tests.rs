@@ -14,7 +14,7 @@ const NEURONS: usize = 120;
 
 /// Stiff along 3, as chains are, and softening: S = D E/(1 + |E|²/0.04), E without shear in the norm.
 fn truth(c: &Voigt) -> Voigt {
-    let e = voigt::strain_of_right_cauchy_green(c);
+    let e = voigt::strain_from_right_cauchy_green(c);
     #[rustfmt::skip]
     let d = Matrix6::new(
         8e9, 3e9, 4e9, 0.0, 0.0, 0.0,
@@ -76,7 +76,7 @@ fn fitted(rows: &[Voigt]) -> Surrogate<f64> {
         let column: Vec<f64> = targets.iter().map(|s| s[a]).collect();
         (header.output_mean[a], header.output_deviation[a]) = moments(&column);
     }
-    header.support = Some(Support::of(rows, 256).unwrap());
+    header.support = Some(Support::from_rows(rows, 256).unwrap());
     let network = |seed: u64| {
         let network = Network::<f64>::random(header.architecture.clone(), seed).unwrap();
         let mut random = SplitMix64::new(seed + 100);
