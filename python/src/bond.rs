@@ -180,7 +180,7 @@ pub struct BondLaw {
 
 #[pymethods]
 impl BondLaw {
-    /// Of the tensions at [`Self::stretches`].
+    /// Creates a law from the tensions at [`Self::stretches`].
     #[new]
     fn new(low: f64, high: f64, tension: PyReadonlyArray1<'_, f64>) -> PyResult<Self> {
         let stretches = stretches(low, high)?;

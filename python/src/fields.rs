@@ -7,8 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
 
-/// What a file holds: `times`, `points` (a number), `arrays` and `cell_arrays` (names and components), and of a mesh
-/// `connectivity`, `ends`, `types`.
+/// Content of a file: `times`, `points` (a number), `arrays` and `cell_arrays` (names and components), and for a mesh `connectivity`, `ends`, `types`.
 #[pyfunction]
 pub fn layout(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyDict>> {
     let series = vtkhdf::read(&path).map_err(|error| file(&error))?;

@@ -16,7 +16,7 @@ use pyo3::types::PyDict;
 use rayon::prelude::*;
 use std::sync::atomic::Ordering;
 
-/// From so many numbers on they are shared out to threads.
+/// Least number of values that are distributed to threads.
 const MANY: usize = 1 << 14;
 
 /// Numbers that a thread takes at once.

@@ -368,7 +368,7 @@ where
     model.build().map(|built| Box::new(built) as Box<dyn AnyBody>).map_err(|error| fault(&error))
 }
 
-/// Which points a function of Python takes.
+/// Selects the points for which a function of Python returns true.
 fn asked<const D: usize>(region: &Py<PyAny>, points: &[[f64; D]]) -> PyResult<Vec<bool>> {
     Python::attach(|py| {
         let flat: Vec<f64> = points.iter().flatten().copied().collect();

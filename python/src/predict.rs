@@ -19,7 +19,7 @@ const UPPER: [usize; 6] = [0, 4, 8, 1, 2, 5];
 /// And those of their mirror images.
 const LOWER: [usize; 6] = [0, 4, 8, 3, 6, 7];
 
-/// What is asked of a law at rows of `width` numbers.
+/// Options of a prediction at rows of `width` numbers.
 #[derive(Clone, Copy)]
 struct How {
     width: usize,
@@ -29,7 +29,7 @@ struct How {
     rounding: f64,
 }
 
-/// What a law predicts at N points.
+/// Predictions at N points.
 #[derive(Default)]
 struct Found {
     stress: Vec<f64>,
@@ -42,7 +42,7 @@ struct Found {
     unseen: Vec<bool>,
 }
 
-/// What a thread fills.
+/// Share of the output that a thread fills.
 struct Part<'a> {
     c: &'a [f64],
     stress: &'a mut [f64],

@@ -26,7 +26,7 @@ macro_rules! of_program {
     };
 }
 
-/// How a run behaves.
+/// Options of a run.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Behaviour {

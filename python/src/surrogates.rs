@@ -19,7 +19,7 @@ type Layers<'py> = Vec<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>)>;
 
 #[pymethods]
 impl Surrogate {
-    /// From the bytes of a file.
+    /// Reads a model from the bytes of a file.
     #[new]
     fn new(bytes: &[u8]) -> PyResult<Self> {
         surrogate::Surrogate::from_bytes(bytes).map(|law| Self { law }).map_err(value)
@@ -30,8 +30,7 @@ impl Surrogate {
         py.detach(|| surrogate::Surrogate::read(path)).map(|law| Self { law }).map_err(|error| file(&error))
     }
 
-    /// From a header in JSON (its `architecture` and `members` follow from the weights) and W, (outputs, inputs), and b of each layer
-    /// of each member.
+    /// Builds a model from a header in JSON (its `architecture` and `members` follow from the weights) and W, (outputs, inputs), and b of each layer of each member.
     #[staticmethod]
     fn build(
         header: &str,

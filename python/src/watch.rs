@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
 use std::time::{Duration, Instant};
 
-/// How often signals are looked for.
+/// Interval between checks for signals.
 const EVERY: Duration = Duration::from_millis(50);
 
 /// Time between two calls of a function that sees progress.
@@ -24,7 +24,7 @@ pub struct Watchers {
     pub on_step: Option<Py<PyAny>>,
 }
 
-/// What the working thread says.
+/// Message of the working thread.
 enum Message {
     Progress(f64, String),
     Step(Step, SyncSender<bool>),
@@ -40,12 +40,12 @@ pub struct Line<'a> {
 }
 
 impl<'a> Line<'a> {
-    /// Whether the user asked to stop.
+    /// Flag that is true once the user asks to stop.
     pub fn stop(&self) -> &'a AtomicBool {
         self.stop
     }
 
-    /// Whether a function of Python sees steps.
+    /// Returns true if a function of Python receives the steps.
     pub fn wants_steps(&self) -> bool {
         self.wants_steps
     }

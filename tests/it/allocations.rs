@@ -40,7 +40,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// What the work gives, and the most bytes that this thread held at once beyond those it held before.
+/// Returns the result of the work, and the peak of bytes that this thread held beyond those it held before.
 pub fn most<T>(work: impl FnOnce() -> T) -> (T, u64) {
     let before = HELD.get();
     MOST.set(before);

@@ -102,7 +102,7 @@ fn strip_of_scattered_points() {
     on_any_number_of_threads(here);
 }
 
-/// Whether the same scene is run twice, or the directory held other results before, makes no difference.
+/// Results do not depend on an earlier run or other results in the same directory.
 #[test]
 fn a_second_run_into_the_same_directory() {
     let directory = tempfile::tempdir().unwrap();

@@ -416,7 +416,7 @@ fn what_changes_before_a_resume_is_noticed() {
     assert_same(&here.join("out/undisturbed"), &here.join("out/strip"));
 }
 
-/// So it is for the tables of a part, and for all programs: the harness sees to it.
+/// Reports describe how tables were read, for a part and in all programs.
 #[test]
 fn a_report_tells_what_was_read() {
     let directory = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! What the command lines promise: exit codes, help, closed forms, reports and files.
+//! Command lines: exit codes, help, closed forms, reports and files.
 
 use crate::program::{command, finish, peri, workspace};
 use crate::results::{report, scalar};
@@ -83,7 +83,7 @@ fn standard_output_that_takes_no_more() {
     }
 }
 
-/// What cannot be read is bad input, in a scene with its place; answers at strains with a slip in a name are refused.
+/// Unreadable inputs are bad input, in a scene with their place; misspelled component names are refused.
 #[test]
 fn inputs_of_mdsurrogate_that_cannot_be_used() {
     let folder = tempfile::tempdir().unwrap();
@@ -262,8 +262,7 @@ fn particles_of_the_plate() -> usize {
     cells.filter(|(x, y)| x * x + y * y >= 3600.0).count()
 }
 
-/// Of the bar's 20 × 4 × 4 cells, 10 mm wide, those pairs within 30.15 mm between which the segment meets x = 100 mm at
-/// y up to `height` mm.
+/// Counts, among the bar's 20 × 4 × 4 cells, 10 mm wide, the pairs within 30.15 mm whose segment meets x = 100 mm at y up to `height` mm.
 fn pairs_across_the_crack(height: i32) -> usize {
     let cells = |from: i32, to: i32| {
         (from..to).flat_map(|x| (0..16).map(move |k| [x, k / 4, k % 4].map(|cell| 5 + 10 * cell)))

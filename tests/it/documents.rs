@@ -99,7 +99,7 @@ fn parts(line: &str) -> Vec<Vec<String>> {
     parts
 }
 
-/// Which of our programs a command runs, and its arguments.
+/// Returns which of our programs a command runs, and its arguments.
 fn ours(words: &[String]) -> Option<(&str, Vec<&str>)> {
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     match words[..] {
@@ -233,7 +233,7 @@ fn rust_examples_are_doctests_or_programs() {
     assert!(programs >= 4 && fences.len() > programs, "{programs} of {}", fences.len());
 }
 
-/// What mdBook would leave out: pages that SUMMARY.md does not name.
+/// Pages that SUMMARY.md does not name are missing from the book.
 #[test]
 fn every_page_is_in_the_summary() {
     let guide = workspace().join("docs/guide/src");

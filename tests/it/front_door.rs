@@ -1,5 +1,4 @@
-//! What users hand in, damaged at random: scenes, meshes, tool paths, tables, clouds, HDF5, laws, checkpoints. No panic,
-//! no hang, no memory beyond what the file justifies, and an error that names the place.
+//! Robustness against input files damaged at random: scenes, meshes, tool paths, tables, clouds, HDF5, laws, checkpoints. No panic, no hang, no memory beyond what the file justifies, and an error that names the place.
 //!
 //! 2000 mutations of each kind, the same ones every time; `FRONT_DOOR=100000 cargo test --release -p tests front_door`
 //! takes that many, new ones every time. What it finds is kept in tests/proptest-regressions and tried first.
@@ -25,10 +24,10 @@ const FEW: u32 = 2000;
 const PATIENCE: Duration = Duration::from_secs(5);
 /// Memory that opening a file may take: so much, and so many times its length.
 const MEMORY: [u64; 2] = [32 << 20, 256];
-/// Of a larger file only so much is taken.
+/// Bytes taken of a larger file.
 const LARGEST: usize = 64 << 10;
 
-/// What is put in: numbers at the edges, brackets, words of the formats.
+/// Tokens to insert: extreme numbers, brackets, words of the formats.
 const TOKENS: [&str; 48] = [
     "0",
     "-1",
@@ -80,7 +79,7 @@ const TOKENS: [&str; 48] = [
     "true",
 ];
 
-/// One change of a file; places and lengths are shares of its length.
+/// Change of a file; places and lengths are shares of its length.
 #[derive(Clone, Debug)]
 enum Change {
     Flip(u16, u8),
@@ -141,7 +140,7 @@ fn attack(kind: &str, files: &[PathBuf], name: &str, open: impl Fn(&[u8]) -> Res
     attack_some(1, kind, files, name, open);
 }
 
-/// One of `share` mutations.
+/// Applies one of `share` mutations.
 fn attack_some(
     share: u32,
     kind: &str,

@@ -1,4 +1,4 @@
-//! What all programs have from the harness: the same commands, and sweeps.
+//! Functions that all programs have from the harness: the same commands, and sweeps.
 
 use crate::program::{command, finish, peri, workspace};
 use crate::scenes;

@@ -1,4 +1,4 @@
-//! What the system allows: room on the disk, memory of a process, one run a folder.
+//! Limits of the system: disk space, memory of a process, one run per folder.
 #![cfg(unix)]
 
 use crate::parts::BAR;

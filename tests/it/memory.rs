@@ -13,10 +13,10 @@ use std::time::Duration;
 /// allocated, taken what is ever written: most sites of a thin body are not.
 const LARGE: f64 = 100e6;
 const FACTOR: f64 = 4.0;
-/// What a program may take before it refuses a scene.
+/// Memory that a program may take before it refuses a scene, bytes.
 const REFUSED: f64 = 20e6;
 
-/// What a command line left behind, and the most memory that it held, bytes (VmHWM of proc_pid_status(5)).
+/// Runs a program; returns its output and its peak memory, bytes (VmHWM of proc_pid_status(5)).
 fn watched(program: &str, arguments: &str, here: &Path) -> (Ended, f64) {
     let child = command(program, arguments, here).spawn().unwrap();
     let status = format!("/proc/{}/status", child.id());
@@ -106,7 +106,7 @@ fn of_lines() {
     holds("crystfem", &(brick + &lines), &[]);
 }
 
-/// One row of cells and a long horizon: most sites are empty.
+/// Thin bodies: one row of cells and a long horizon, so that most sites are empty.
 #[test]
 fn of_a_thin_body() {
     let thin = scenes::plate("\"100 mm\"", "1e-2")

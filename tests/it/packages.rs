@@ -1,4 +1,4 @@
-//! What docs/ARCHITECTURE.md says of dependencies.
+//! Dependency rules of docs/ARCHITECTURE.md.
 
 use crate::program::{executable, workspace};
 use std::process::Command;

@@ -14,7 +14,7 @@ pub const PACKAGES: [&str; 7] =
 /// Longer than any of these tests takes on a busy machine: a program that hangs ends here.
 const PATIENCE: Duration = Duration::from_secs(240);
 
-/// What a program left behind.
+/// Output of a program.
 #[derive(Debug)]
 pub struct Ended {
     /// Exit code; none where a signal ended it.

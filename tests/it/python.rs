@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::time::Instant;
 
-/// What the tests cannot do without, and what they use where it can be had.
+/// Required packages, and optional ones that are used if available.
 const NEEDED: [&str; 3] = ["maturin", "numpy", "pytest"];
 const USED: [&str; 4] = ["matplotlib", "mypy", "pandas", "xarray"];
 
@@ -34,7 +34,7 @@ fn passes(interpreter: &Path, arguments: &[&str]) -> bool {
     python(interpreter, arguments).is_some_and(|output| output.status.success())
 }
 
-/// Whether modules can be imported.
+/// Returns true if the modules can be imported.
 fn has(interpreter: &Path, modules: &[&str]) -> bool {
     passes(interpreter, &["-c", &format!("import {}", modules.join(", "))])
 }

@@ -1,4 +1,4 @@
-//! What a release promises: one version everywhere, one oldest compiler, and an archive with all that belongs to it.
+//! Requirements of a release: one version everywhere, one oldest compiler, and a complete archive.
 
 use crate::program::{command, executable, finish, workspace};
 use std::collections::BTreeSet;

@@ -1,4 +1,4 @@
-//! What a run must reproduce to the bit, and what it may not: times and provenance.
+//! Parts of a result that must be reproduced to the bit, and those that may differ: times and provenance.
 
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -20,7 +20,7 @@ pub fn scalar(report: &Value, name: &str) -> f64 {
         .unwrap_or_else(|| panic!("no `{name}` in {:#}", report["values"]))
 }
 
-/// Everything that a run leaves, file by file and folder by folder, without times: equal for equal runs.
+/// Reads all results of a run, file by file and folder by folder, without times: equal for equal runs.
 ///
 /// Numbers keep all digits of the JSON text (shortest representation that reads back to the same bits), so equal
 /// text is equal bits.

@@ -1,4 +1,4 @@
-//! From tests of rubber to a simulated specimen: the block that `polycore` fits is a material of `peri`.
+//! Workflow from rubber tests to a simulated specimen: the block that `polycore` fits is a material of `peri`.
 
 use crate::program::{command, finish, peri, workspace};
 use crate::results::{report, scalar};

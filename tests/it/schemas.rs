@@ -27,7 +27,7 @@ fn cases(program: &str) -> Vec<(PathBuf, Value)> {
         .collect()
 }
 
-/// What of draft 7 the schemas use, patterns aside. The schemas were also checked with Python's `jsonschema`.
+/// Checks a value against the part of draft 7 that the schemas use, patterns aside. The schemas were also checked with Python's `jsonschema`.
 fn faults(root: &Value, schema: &Value, value: &Value, place: &str, faults: &mut Vec<String>) {
     let known = [
         "$ref",
@@ -183,7 +183,7 @@ fn slips_are_found() {
     assert!(check(&schema, &scene).iter().any(|fault| fault.contains("material")));
 }
 
-/// What editors show beside a key.
+/// Descriptions that editors show beside a key.
 #[test]
 fn keys_are_documented() {
     for program in PROGRAMS {
@@ -244,7 +244,7 @@ fn keys_are_in_the_reference() {
     assert!(missing.is_empty(), "not in the reference: {missing:?}");
 }
 
-/// What the schema says of the scalars of reports, as a table: name, unit, description.
+/// Formats the scalars of reports in a schema as a table: name, unit, description.
 fn values(program: &str) -> String {
     let schema = schema(program);
     let choices = schema["definitions"]["Expect"]["properties"]["quantity"]["anyOf"].as_array().unwrap();

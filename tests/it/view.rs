@@ -53,7 +53,7 @@ fn run(program: &str, arguments: &str, here: &Path) -> Ended {
     finish(command(program, arguments, here).spawn().unwrap())
 }
 
-/// What a page tells of its run.
+/// Returns the data of a page.
 fn told(page: &str) -> Value {
     let (_, rest) = page.split_once("<script type=\"application/json\" id=\"run\">").unwrap();
     serde_json::from_str(rest.split_once("</script>").unwrap().0).unwrap()

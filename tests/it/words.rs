@@ -1,4 +1,4 @@
-//! What `crystfem` says of slips that would pass in silence, and how much it says.
+//! Messages of `crystfem` for mistakes that would pass in silence, and their number.
 
 use crate::parts::BAR;
 use crate::program::{Ended, command, finish};

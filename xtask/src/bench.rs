@@ -24,7 +24,7 @@ mod peri_solvers;
 mod scikit_fem;
 mod surrogate;
 
-/// What to measure.
+/// Options of `bench`.
 #[derive(clap::Args)]
 pub struct Options {
     /// `langevin`, `peri-laws`, `peri-peers` (beside LAMMPS), `peri-solvers [-- MM,MM…]`, `crystfem [-- PART… N,N…]`
@@ -42,13 +42,13 @@ pub struct Options {
 /// target/bench/NAME.json.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct Bench {
-    /// When, where and from which sources.
+    /// Provenance: date, machine and hash of the sources.
     pub stamp: Stamp,
-    /// What was measured.
+    /// Measured rows.
     pub rows: Vec<Row>,
 }
 
-/// What a bench has left; none where it has not run.
+/// Reads the result of a bench; `None` if it has not run.
 pub fn read(workspace: &Workspace, name: &str) -> Option<Bench> {
     let text = std::fs::read_to_string(workspace.target().join(format!("bench/{name}.json"))).ok()?;
     serde_json::from_str(&text).ok()
@@ -147,7 +147,7 @@ fn text(rows: &[Row]) -> String {
     table.text()
 }
 
-/// To target/bench/NAME.json, with what tells whether the rows still hold.
+/// Writes target/bench/NAME.json, with the provenance of the rows.
 fn write(workspace: &Workspace, name: &str, rows: &[Row]) -> Result<PathBuf> {
     let path = workspace.results("bench")?.join(format!("{name}.json"));
     let of = name.split('-').next().unwrap_or(name);

@@ -13,7 +13,7 @@ use crate::licences;
 use crate::table::print;
 use crate::workspace::Workspace;
 
-/// What an archive contains of the tree.
+/// Files of the tree that an archive contains.
 const FILES: [&str; 5] = ["README.md", "CHANGELOG.md", "CITATION.cff", "LICENSE-APACHE", "LICENSE-MIT"];
 /// Shells and what their completions are called.
 const SHELLS: [(&str, &str, &str); 5] = [
@@ -87,7 +87,7 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     Ok(true)
 }
 
-/// What a program prints.
+/// Returns the output of a program.
 fn said(executable: &Path, arguments: &[&str]) -> Result<Vec<u8>> {
     let output = Command::new(executable)
         .args(arguments)

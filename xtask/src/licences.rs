@@ -10,7 +10,7 @@ use serde::Deserialize;
 
 use crate::workspace::Workspace;
 
-/// What names of files with terms begin with.
+/// Prefixes of the names of licence files.
 const TERMS: [&str; 5] = ["LICENSE", "LICENCE", "COPYING", "NOTICE", "UNLICENSE"];
 
 #[derive(Deserialize)]
@@ -146,7 +146,7 @@ mod tests {
     use super::*;
     use std::path::PathBuf;
 
-    /// What is linked is listed, each with terms; tests and what other systems need are not.
+    /// Every linked crate is listed with its terms; dev-dependencies and those of other systems are not.
     #[test]
     fn every_linked_crate_has_terms() {
         let workspace = Workspace::new(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(".."));

@@ -1,10 +1,10 @@
-//! What became of a case.
+//! Outcome of a case.
 
 use std::path::{Path, PathBuf};
 
 use harness::report::{Judgement, Report, Value};
 
-/// What became of a case.
+/// Outcome of a case.
 #[derive(Default)]
 pub struct Outcome {
     /// `ch2/plate-with-hole`.
@@ -17,11 +17,11 @@ pub struct Outcome {
     pub title: String,
     /// The command line that ran it.
     pub program: String,
-    /// What a user types to run it.
+    /// Command with which a user runs it.
     pub command: String,
     /// The folder of its results.
     pub output: PathBuf,
-    /// What it printed.
+    /// Output of the program.
     pub log: PathBuf,
     /// Wall time of the whole program.
     pub seconds: f64,
@@ -29,12 +29,12 @@ pub struct Outcome {
     pub kept: bool,
     /// Why it failed other than by its expectations: a crash, no report.
     pub failure: Option<String>,
-    /// What it wrote.
+    /// Report of the run.
     pub report: Option<Report>,
 }
 
 impl Outcome {
-    /// Of a case that has not run yet.
+    /// Creates the outcome of a case that has not run yet.
     pub fn new(case: &str) -> Self {
         Self { case: case.to_owned(), ..Self::default() }
     }
@@ -77,7 +77,7 @@ impl Outcome {
         }
     }
 
-    /// It ran to its end and met every expectation.
+    /// Returns true if the run ended and met every expectation.
     pub fn passed(&self) -> bool {
         self.failure.is_none() && self.expect().iter().all(|judgement| judgement.pass)
     }
@@ -95,7 +95,7 @@ impl Outcome {
         self.expect().iter().map(row).chain(failure)
     }
 
-    /// What failed, by how much, and where to look; empty if nothing did.
+    /// Lists failures, their amounts, and where to look; empty if there are none.
     pub fn complaint(&self, short: impl Fn(&Path) -> String) -> String {
         let missed = self.expect().iter().filter(|judgement| !judgement.pass);
         let mut lines: Vec<String> = missed
@@ -123,7 +123,7 @@ fn shown(value: f64) -> String {
     format!("{value:.digits$}")
 }
 
-/// How far a value lies outside what was requested.
+/// Returns the amount by which a value lies outside its tolerance.
 fn beyond(judgement: &Judgement) -> Option<String> {
     use harness::report::Bound;
     let value = judgement.value.filter(|value| value.is_finite())?;
@@ -151,7 +151,7 @@ pub mod tests {
         serde_json::to_string(&report).expect("JSON")
     }
 
-    /// Its outcome.
+    /// Builds an outcome from a report.
     pub fn outcome(report: &str, status: Option<&str>) -> Outcome {
         let mut outcome = Outcome::new("ch2/plate");
         outcome.judge(serde_json::from_str(report).expect("a report"), status.map(str::to_owned), false);

@@ -34,11 +34,11 @@ use pictures::{Gallery, Picture};
 /// Pictures shown of each case in the list of cases.
 const PICTURES: usize = 6;
 
-/// What the report is made from besides the outcomes.
+/// Sources of the report besides the outcomes.
 pub struct Sources {
     map: thesis::Map,
     errata: Vec<errata::Erratum>,
-    /// What the last run of the tests measured.
+    /// Measurements of the last run of the tests.
     records: Records,
     baseline: Option<Baseline>,
 }
@@ -58,7 +58,7 @@ impl Sources {
     }
 }
 
-/// How much was run.
+/// Amount of work of a validation.
 #[derive(Clone, Copy)]
 pub struct Tier {
     /// Without what cases mark `quick = false`.
@@ -67,7 +67,7 @@ pub struct Tier {
     pub everything: bool,
 }
 
-/// Everything on the page.
+/// Content of the page.
 #[derive(Serialize)]
 struct Page {
     passed: bool,
@@ -318,7 +318,7 @@ fn anchor(name: &str) -> String {
     parts.collect::<Vec<_>>().join("-").to_lowercase()
 }
 
-/// From target/validation to a file.
+/// Path of a file relative to target/validation.
 pub fn link(workspace: &Workspace, file: &Path) -> String {
     match (workspace.target().strip_prefix(workspace.root()), file.strip_prefix(workspace.root())) {
         (Ok(target), Ok(below)) => {

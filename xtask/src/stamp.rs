@@ -1,4 +1,4 @@
-//! When, where and from which sources something was measured: what tells whether it still holds.
+//! Provenance of a measurement; detects stale records.
 
 use std::fmt;
 use std::fs;
@@ -8,7 +8,7 @@ use harness::report::Report;
 use miette::{IntoDiagnostic, Result, WrapErr};
 use serde::{Deserialize, Serialize};
 
-/// Of a bench's rows, or of a number that a test measured.
+/// Provenance of a bench's rows, or of a number that a test measured.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Stamp {
     /// The commit that was checked out.
@@ -23,7 +23,7 @@ pub struct Stamp {
 }
 
 impl Stamp {
-    /// Of now, for what was measured from `sources`.
+    /// Creates the provenance of a measurement made now from `sources`.
     pub fn new(root: &Path, sources: &[String]) -> Result<Self> {
         let provenance = Report::new("xtask", env!("CARGO_PKG_VERSION"), "").provenance;
         let hash = hash(root, sources).into_diagnostic().wrap_err_with(|| sources.join(", "))?;
@@ -53,7 +53,7 @@ impl fmt::Display for Stamp {
 /// The numerics of `polycore`, on which the other crates rest.
 const NUMERICS: [&str; 4] = ["constitutive", "langevin", "random", "tensor"];
 
-/// What the numbers of crates depend on: `parts` of their folders (`src`, `tests`), and the numerics of `polycore`.
+/// Lists the sources that numbers of crates depend on: `parts` of their folders (`src`, `tests`), and the numerics of `polycore`.
 pub fn sources(root: &Path, crates: &[&str], parts: &[&str]) -> Vec<String> {
     let folders =
         crates.iter().flat_map(|name| parts.iter().map(move |part| format!("crates/{name}/{part}")));
@@ -62,7 +62,7 @@ pub fn sources(root: &Path, crates: &[&str], parts: &[&str]) -> Vec<String> {
     folders.chain(below).filter(|source| root.join(source).exists()).collect()
 }
 
-/// Of the names and contents of all files, in the order of their names: FNV-1a, the same on every machine.
+/// Hashes names and contents of all files, sorted by name, by FNV-1a: the same on every machine.
 fn hash(root: &Path, sources: &[String]) -> std::io::Result<String> {
     let mut files = Vec::new();
     for source in sources {

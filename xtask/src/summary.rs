@@ -1,4 +1,4 @@
-//! What the suite found, as tables for the terminal.
+//! Results of the validation, as tables for the terminal.
 
 use std::fmt::Write as _;
 
@@ -56,7 +56,7 @@ pub fn sums(outcomes: &[Outcome]) -> String {
     text
 }
 
-/// How many expectations there are of each kind that there is.
+/// Counts the expectations of each kind.
 pub fn kinds(outcomes: &[Outcome]) -> Vec<(Kind, usize)> {
     let count = |kind: Kind| {
         let judged = outcomes.iter().flat_map(Outcome::expect);

@@ -4,7 +4,7 @@ use std::io::Write as _;
 
 use harness::report::aligned;
 
-/// To standard output; a closed pipe is no reason to fail.
+/// Writes to standard output; ignores a closed pipe.
 pub fn print(text: &str) {
     let _ = std::io::stdout().write_all(text.as_bytes());
 }
@@ -26,7 +26,7 @@ impl<const N: usize> Table<N> {
         self.rows.push(row);
     }
 
-    /// Whether there is a row.
+    /// Returns true if there is no row.
     pub fn is_empty(&self) -> bool {
         self.rows.is_empty()
     }

@@ -15,13 +15,13 @@ use crate::stamp::{Stamp, sources};
 use crate::table::print;
 use crate::workspace::Workspace;
 
-/// As crate `evidence` names it.
+/// Environment variable that crate `evidence` reads.
 const FOLDER: &str = "EVIDENCE_FOLDER";
 
 /// A number as a test measured it, the file of crate `evidence` in words of Rust.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Record {
-    /// What cases/thesis.toml refers to.
+    /// Name, as cases/thesis.toml refers to it.
     pub name: String,
     /// A number, or `NaN`, `inf`.
     value: serde_json::Value,
@@ -33,17 +33,17 @@ pub struct Record {
     at_least: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     at_most: Option<f64>,
-    /// As asserted.
+    /// True if the assertion held.
     pub met: bool,
     /// `calibrate::tests::single_point_integrals`.
     pub test: String,
     /// `crates/peri/src/calibrate.rs`.
     pub file: String,
-    /// Of the run of the tests; none in a file that a test has just left.
+    /// Provenance of the test run; `None` in a file that a test has just written.
     pub stamp: Option<Stamp>,
 }
 
-/// What a test could not find.
+/// Requirement that a test could not find.
 #[derive(Debug, Deserialize)]
 struct Skip {
     skipped: String,
@@ -133,7 +133,7 @@ pub fn read(workspace: &Workspace) -> Records {
     records.into_iter().map(|record| (record.name.clone(), record)).collect()
 }
 
-/// What tests have left in the folder.
+/// Reads the records that tests have left in the folder.
 fn collect(folder: &Path) -> Result<(Vec<Record>, Vec<Skip>)> {
     let (mut records, mut skips) = (Vec::new(), Vec::new());
     for entry in fs::read_dir(folder).into_diagnostic()? {
@@ -152,7 +152,7 @@ fn collect(folder: &Path) -> Result<(Vec<Record>, Vec<Skip>)> {
     Ok((records, skips))
 }
 
-/// What was not tested; empty if everything was.
+/// Lists the skipped tests; empty if there are none.
 fn untested(skips: &[Skip]) -> String {
     let lines = skips.iter().map(|skip| format!("  {}: needs {}\n", skip.skipped, skip.needs));
     let lines: String = lines.collect();

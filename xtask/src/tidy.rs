@@ -76,7 +76,7 @@ fn is_source(file: &Path) -> bool {
     in_src && file.extension().is_some_and(|extension| extension == "rs")
 }
 
-/// What git knows, and what it would take in with `git add`.
+/// Lists the files that git tracks or would add with `git add`.
 fn tracked(root: &Path) -> Result<Vec<PathBuf>> {
     let output = Command::new("git")
         .args(["ls-files", "-z", "--cached", "--others", "--exclude-standard"])

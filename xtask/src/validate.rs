@@ -21,7 +21,7 @@ use execute::{Settings, run_case};
 /// Lines of a failed case's output that are shown.
 const TAIL: usize = 30;
 
-/// What to run.
+/// Options of `validate`.
 #[derive(clap::Args)]
 pub struct Options {
     /// Only cases in this folder of cases/, for example `ch2`; may be repeated.
@@ -159,7 +159,7 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     Ok(outcomes.iter().all(Outcome::passed))
 }
 
-/// What a user types to run a case.
+/// Command with which a user runs a case.
 fn command(outcome: &Outcome, quick: bool) -> String {
     let quick = if quick { " --quick" } else { "" };
     format!("cargo run --release -p {} -- run {}{quick}", outcome.program, outcome.file)

@@ -1,4 +1,4 @@
-//! Where things are, and how cargo is called.
+//! Paths of the repository, and calls of cargo.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ pub struct Workspace {
 }
 
 impl Workspace {
-    /// With build products where cargo puts them.
+    /// Creates the paths, with build products where cargo puts them.
     pub fn new(root: PathBuf) -> Self {
         let root = root.canonicalize().unwrap_or(root);
         let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| "target".into(), PathBuf::from);
@@ -26,7 +26,7 @@ impl Workspace {
         &self.root
     }
 
-    /// Where cargo puts build products.
+    /// Folder of cargo's build products.
     pub fn target(&self) -> &Path {
         &self.target
     }

@@ -5,7 +5,7 @@ use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Whether a program is there; says that the test is skipped if not.
+/// Returns true if a program is installed; otherwise records that the test is skipped.
 #[track_caller]
 pub fn there(program: &str) -> bool {
     let found = Command::new(program).arg("--version").output().is_ok_and(|output| output.status.success());

@@ -2,10 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-/// One measured number.
+/// Measured number.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Measurement {
-    /// What was measured.
+    /// Quantity that was measured.
     pub what: String,
     /// Size of the problem: particles, equations, steps, points.
     pub size: u64,

@@ -10,7 +10,7 @@ use harness::scene::{Failure, Source};
 use polycore::Error;
 
 mod cli {
-    /// Everything printed and written is in MPa.
+    /// Unit of all output, Pa: MPa.
     pub const MPA: f64 = 1e6;
 
     pub mod card;

@@ -329,7 +329,7 @@ fn a_law_that_fails_is_named() {
     assert!(report.scalar("t.gent.rms").is_some() && report.scalar("t.ogden-2.rms").is_none());
 }
 
-/// What a table leaves open is settled by a key, and what it cannot be is said.
+/// Keys resolve ambiguous tables, and tables that cannot be read are refused.
 #[test]
 fn tables_of_laboratories() {
     let laboratory = "Test;Specimen;Strain (%);Stress (MPa)\nuniaxial;1;0,0;0\nuniaxial;1;50,0;0,527778\n\

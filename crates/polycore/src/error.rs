@@ -10,7 +10,7 @@ pub const EXIT_BAD_INPUT: u8 = 2;
 /// Exit code of a run that the user stopped.
 pub const EXIT_INTERRUPTED: u8 = 130;
 
-/// What can go wrong outside reading a scene (`scene::SceneError` is for that).
+/// Error outside reading a scene (for which there is `scene::SceneError`).
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -39,7 +39,7 @@ pub enum Error {
         path: PathBuf,
         /// `VTKHDF file`, `report`, …
         format: &'static str,
-        /// What is wrong with it.
+        /// Defect of the content.
         reason: String,
     },
     /// Data that cannot be written or drawn.
@@ -47,7 +47,7 @@ pub enum Error {
     Data {
         /// The array, curve or picture.
         what: String,
-        /// What is wrong with it.
+        /// Defect of the data.
         reason: String,
     },
     /// A checkpoint cannot be used.
@@ -63,7 +63,7 @@ pub enum Error {
     Option {
         /// The option, as it was written.
         option: String,
-        /// What is wrong with it, and what is allowed.
+        /// Defect of the option, and allowed values.
         reason: String,
     },
     /// A run was asked to stop; its checkpoint is written.
@@ -109,7 +109,7 @@ pub enum Error {
     Table(#[from] crate::table::Error),
 }
 
-/// What a user can do something about, before the system's own words.
+/// Returns a plain explanation of an error that the user can act on, to precede the system's text.
 fn plainly(error: &io::Error) -> &'static str {
     match error.kind() {
         io::ErrorKind::StorageFull => "the disk is full: ",
@@ -119,14 +119,14 @@ fn plainly(error: &io::Error) -> &'static str {
     }
 }
 
-/// Whether a file could not be written because there is no more room for it, which is no fault of the input.
+/// Returns true if a file could not be written for lack of space, which is no fault of the input.
 #[cfg(feature = "files")]
 pub(crate) fn no_room(error: &io::Error) -> bool {
     !plainly(error).is_empty()
 }
 
 impl Error {
-    /// For `map_err`: `fs::rename(a, b).map_err(Error::from_io("rename", b))`.
+    /// Returns a closure for `map_err`: `fs::rename(a, b).map_err(Error::from_io("rename", b))`.
     pub fn from_io(operation: &'static str, path: impl AsRef<Path>) -> impl FnOnce(io::Error) -> Self {
         let path = path.as_ref().to_path_buf();
         move |source| Self::Io { operation, path, source }

@@ -49,8 +49,7 @@ fn available_in(root: &Path) -> f64 {
 const VERSION_1: [&str; 3] = ["memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"];
 const VERSION_2: [&str; 3] = ["memory.max", "memory.current", "inactive_file"];
 
-/// What a control group and those above it leave, bytes; `None` where none has a limit. Where the path is that of another
-/// name space, as in a container, the groups that are there count.
+/// Free memory within the limits of a control group and its ancestors, bytes; `None` without a limit. If the path belongs to another name space, as in a container, the groups that exist count.
 fn in_group(mount: &Path, path: &str, [limit, taken, cache]: &[&str; 3]) -> Option<f64> {
     let folder = mount.join(path.trim_start_matches('/'));
     let above = folder.ancestors().take_while(|folder| folder.starts_with(mount));

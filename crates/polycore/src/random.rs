@@ -32,7 +32,7 @@ impl SplitMix64 {
         ((u128::from(self.next_u64()) * bound as u128) >> 64) as usize
     }
 
-    /// Of the standard normal distribution, by the polar method of Marsaglia & Bray 1964, <https://doi.org/10.1137/1006063>.
+    /// Draws from the standard normal distribution, by the polar method of Marsaglia & Bray 1964, <https://doi.org/10.1137/1006063>.
     pub fn normal(&mut self) -> f64 {
         loop {
             let (a, b) = (2.0 * self.uniform() - 1.0, 2.0 * self.uniform() - 1.0);

@@ -39,9 +39,9 @@ pub struct Error {
     pub line: usize,
     /// Column, row, headings or file.
     pub what: String,
-    /// What is there.
+    /// Content found.
     pub found: String,
-    /// What may be there, and how the table was understood.
+    /// Allowed content, and the layout of the table.
     pub allowed: String,
 }
 
@@ -146,12 +146,12 @@ impl Table {
         &self.path
     }
 
-    /// How the file is written.
+    /// Layout of the file.
     pub fn layout(&self) -> &Layout {
         &self.layout
     }
 
-    /// One line: how the file is written and which columns are used.
+    /// Describes the layout and the columns used, in one line.
     pub fn describe(&self, used: &[usize]) -> String {
         let names: Vec<String> = used.iter().map(|&i| format!("`{}`", self.headings[i].text)).collect();
         let plural = if names.len() == 1 { "" } else { "s" };
@@ -236,7 +236,7 @@ impl Table {
         number.ok_or_else(|| self.refuse_cell(row, column, &self.why_no_number(text)))
     }
 
-    /// As [`Table::number`], nothing of a cell that is blank or says that there is no number (`n/a`, `-`).
+    /// Reads a number, or `None` from a cell that is blank or states that there is no number (`n/a`, `-`).
     ///
     /// # Errors
     /// A cell that is neither blank nor a finite number.
@@ -274,7 +274,7 @@ impl Table {
         (0..self.rows()).map(value).collect()
     }
 
-    /// What a remark says behind a mark such as `# source:`, of the first that has it.
+    /// Text after a mark such as `# source:`, from the first remark that has it.
     pub fn remark(&self, mark: &str) -> Option<&str> {
         self.remarks.iter().find_map(|line| line.trim().strip_prefix(mark)).map(str::trim)
     }

@@ -37,7 +37,7 @@ pub enum Error {
         row: usize,
         /// Column, from 1.
         column: usize,
-        /// What stands there.
+        /// Value of the component.
         value: f64,
     },
     /// det F ≤ 0: the material is turned inside out or squeezed to nothing.
@@ -49,13 +49,13 @@ pub enum Error {
     /// det F is beyond the range of `f64`.
     #[error("the determinant of the deformation gradient leaves the range of f64 ({determinant})")]
     OutOfRange {
-        /// What det F came to.
+        /// Value of det F.
         determinant: f64,
     },
     /// A stretch is not a positive finite number.
     #[error("stretch {index} is {value}; a stretch must be positive and finite")]
     Stretch {
-        /// Which one, from 1.
+        /// Index of the stretch, from 1.
         index: usize,
         /// The value given.
         value: f64,

@@ -34,7 +34,7 @@ pub struct Cuboid {
 }
 
 impl Cuboid {
-    /// Its volume, m³.
+    /// Volume, m³.
     pub fn volume(&self) -> f64 {
         (0..3).map(|d| self.max[d] - self.min[d]).product()
     }
@@ -46,7 +46,7 @@ impl Cuboid {
     }
 }
 
-/// What a cell and a box have in common.
+/// Intersection of a cell and a box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Part {
     cell: u32,
@@ -251,7 +251,7 @@ pub fn integral(points: &[[f64; 3]], cells: &[[u32; 8]], values: &[f64]) -> Resu
 }
 
 impl Cuboid {
-    /// Of a point from the middle, over half the edge: at most 1 inside.
+    /// Distance of a point from the middle, over half the edge: at most 1 inside.
     fn distance(&self, point: [f64; 3]) -> f64 {
         let along =
             |d: usize| (2.0 * point[d] - self.min[d] - self.max[d]).abs() / (self.max[d] - self.min[d]);
@@ -268,7 +268,7 @@ fn is_box(corners: &[[f64; 3]; 8], bounds: &Cuboid) -> bool {
     })
 }
 
-/// What two boxes have in common.
+/// Returns the intersection of two boxes.
 fn cut(cell: &Cuboid, other: &Cuboid, number: u32) -> Option<Part> {
     let (mut volume, mut place) = (1.0, [0.0; 3]);
     for d in 0..3 {

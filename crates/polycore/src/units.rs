@@ -23,11 +23,11 @@ pub use error::UnitError;
 /// (which SI counts as dimensionless; kept apart so that a strain cannot be read as an angle).
 pub type Exponents = [i8; 8];
 
-/// What distinguishes one kind of quantity from another.
+/// Kind of quantity, by its dimension.
 pub trait Dimension {
     /// The powers of the base dimensions.
     const EXPONENTS: Exponents;
-    /// With its article, as error messages use it: `a length`.
+    /// Name with its article, as error messages use it: `a length`.
     const NAME: &'static str;
     /// A valid input, as error messages show it.
     const EXAMPLE: &'static str;
@@ -48,7 +48,7 @@ impl<D: Dimension> Quantity<D> {
     /// Symbol of the SI unit of this quantity.
     pub const UNIT: &'static str = D::UNIT;
 
-    /// From a value already in SI units; used for defaults.
+    /// Creates a quantity from a value in SI units.
     pub const fn from_si(si: f64) -> Self {
         Self { si, dimension: PhantomData }
     }
@@ -141,7 +141,7 @@ impl<D: Dimension> Unit<D> {
     }
 }
 
-/// Whether a text is a unit of any dimension.
+/// Returns true if a text is a unit of any dimension.
 pub fn is_unit(text: &str) -> bool {
     !text.is_empty() && (table::affine(text).is_some() || grammar::unit(text, text).is_ok())
 }

@@ -7,7 +7,7 @@ use std::ffi::{c_char, c_int};
 
 /// Length of a name in Fortran.
 const NAME: usize = 80;
-/// What a host may cut its increment to where there is no stress.
+/// Ratio to which a host may cut its increment if there is no stress.
 const CUT: f64 = 0.25;
 
 /// A material with its name and constants.

@@ -26,11 +26,11 @@ pub use rubber::Rubber;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("umat: {what}: found {found}; allowed: {allowed}")]
 pub struct Error {
-    /// What.
+    /// Name of the quantity.
     pub what: String,
-    /// What was found.
+    /// Value found.
     pub found: String,
-    /// What it may be.
+    /// Allowed values.
     pub allowed: String,
 }
 

@@ -17,8 +17,7 @@ pub struct Print {
     unit: f64,
 }
 
-/// What an increment did with its work, in the host's unit of stress; the three together are the work of the stress on the
-/// strain without the free strain.
+/// Work of an increment by destination, in the host's unit of stress; the three together are the work of the stress on the strain without the free strain.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Dissipation {
     /// Increase of the elastic energy.
@@ -33,7 +32,7 @@ pub struct Dissipation {
 const SIX: usize = 6;
 
 impl Print {
-    /// In the input of a host, without `USER_`.
+    /// Name in the input of a host, without `USER_`.
     pub const NAME: &'static str = "printed-pa12";
     /// z, α, T (K), the total strain at the end (6), and the elastic strains of the branches (6 × 6); all 0 at birth.
     pub const STATES: usize = 9 + 6 * SIX;

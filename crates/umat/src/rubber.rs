@@ -58,7 +58,7 @@ impl Rubber {
         self.stored(f).map(|(stress, tangent, _)| (stress, tangent))
     }
 
-    /// As [`Self::cauchy`], with the stored energy W/J of a unit of the deformed volume, in the host's unit of stress.
+    /// Computes the Cauchy stress and tangent as [`Self::cauchy`], and the stored energy W/J per deformed volume, in the host's unit of stress.
     ///
     /// # Errors
     /// As [`Self::cauchy`].

@@ -7,7 +7,7 @@ use polycore::constitutive::hyperelastic::model;
 use polycore::tensor::Tensor;
 use polycore::tensor::voigt::{self, PAIRS, Voigt, Voigt6x6};
 
-/// What changes from one call to the next.
+/// Arguments that change from one call to the next.
 struct Call<'a> {
     name: &'a str,
     constants: &'a [f64],

@@ -27,7 +27,7 @@ fn program() -> Option<&'static Path> {
     built.as_ref().map(|(folder, name)| PATH.get_or_init(|| folder.path().join(name)).as_path())
 }
 
-/// What the linker calls instead of the material.
+/// Subroutine that the linker calls instead of the material.
 const WRAP: &str = "subroutine wrap(amat, iel, iint, kode, elconloc, emec, emec0, beta, xokl, voj, xkl, vj, ithermal, t1l, dtime, &
     time, ttime, icmd, ielas, mi, nstate_, xstateini, xstate, stre, stiff, iorien, pgauss, orab, pnewdt, ipkon) bind(c, name='__wrap_umat_user_')
     implicit none

@@ -23,18 +23,18 @@ pub const NAMES: [&str; 15] = [
     CONSTANT_NAMES[7],
     CONSTANT_NAMES[8],
 ];
-/// How many a host lists before those of its own kinetics.
+/// Number of constants before those of the user's own kinetics.
 pub const HEAD: usize = 6;
 
 /// A number that the material cannot have.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("umatht: {name}: found {found}; allowed: {allowed}")]
 pub struct Error {
-    /// What.
+    /// Name of the constant.
     pub name: &'static str,
     /// The number.
     pub found: f64,
-    /// What it may be.
+    /// Allowed values.
     pub allowed: String,
 }
 
@@ -52,7 +52,7 @@ pub struct Constants {
     pub material: Semicrystalline,
     /// 0 of the host's temperature, K.
     pub absolute_zero: f64,
-    /// Whether the host is CalculiX.
+    /// True if the host is CalculiX.
     pub calculix: bool,
 }
 

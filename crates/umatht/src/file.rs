@@ -12,11 +12,11 @@ const IN_FILE: f64 = 3.0;
 type Known = (String, Vec<f64>, Rc<[f64]>);
 
 thread_local! {
-    /// Those of the last call on this thread.
+    /// Constants of the last call on this thread.
     static LAST: RefCell<Option<Known>> = const { RefCell::new(None) };
 }
 
-/// Whether constants 7 to 15 of a list are in a file.
+/// Returns true if constants 7 to 15 of a list are in a file.
 pub fn is_asked(list: &[f64]) -> bool {
     list.get(3) == Some(&IN_FILE)
 }

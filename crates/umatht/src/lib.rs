@@ -31,7 +31,7 @@ use nalgebra::Vector3;
 pub struct Increment {
     /// Temperature at the start.
     pub temperature: f64,
-    /// Its change.
+    /// Change over the increment.
     pub change: f64,
     /// Time increment, s.
     pub time: f64,
@@ -51,7 +51,7 @@ pub struct State {
     pub temperature: f64,
 }
 
-/// What the material answers, at the end of an increment.
+/// Response of the material at the end of an increment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Answer {

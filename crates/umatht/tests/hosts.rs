@@ -28,7 +28,7 @@ fn link(compiler: &str, files: &[&Path], folder: &Path) -> PathBuf {
     program
 }
 
-/// From C, by names; the same bits as from Rust.
+/// Calls by names from C give the same bits as from Rust.
 #[test]
 fn answers_in_c() {
     if !there("gcc") {
@@ -71,8 +71,7 @@ int main(void) {
 }
 ";
 
-/// In Abaqus' order: U and the state from the start of the increment in every iteration, increments that are cut back and
-/// tried again; prescribed cooling, and a lumped body with latent heat.
+/// Calls in Abaqus' order: U and the state from the start of the increment in every iteration, increments that are cut back and tried again; prescribed cooling, and a lumped body with latent heat.
 #[test]
 fn follows_the_order_of_abaqus() {
     if !there("gfortran") {

@@ -20,7 +20,7 @@ const SHORT: usize = 26;
 /// Turns, of which medians count; more of what is short.
 const ROUNDS: usize = 3;
 const SHORT_ROUNDS: usize = 5;
-/// How far inner nodes of the distorted brick are moved, over its edge.
+/// Displacement of inner nodes of the distorted brick, over its edge.
 const DISTORTION: &str = "0.1";
 
 /// scikit-fem's mean temperature at 20 000 nodes after 20 steps, K (formulation.md; printed to 8 digits after the point).
@@ -30,15 +30,15 @@ const SAME_MEAN: f64 = 1e-7;
 const SAME_SCIKIT_FEM: f64 = 1e-5;
 const SAME_CALCULIX: f64 = 1e-4;
 
-/// What was measured.
+/// Result of the brick bench.
 pub struct Brick {
     pub rows: Vec<Row>,
     pub text: String,
-    /// Whether all temperatures agree.
+    /// True if all temperatures agree.
     pub passed: bool,
 }
 
-/// One program on one brick.
+/// Run of one program on one brick.
 struct Line {
     program: &'static str,
     edge: usize,
@@ -167,7 +167,7 @@ impl Runs {
         })
     }
 
-    /// Its direct solver, three steps of which are enough.
+    /// Times the direct solver of CalculiX; three steps are enough.
     fn spooles(&mut self, calculix: &Calculix, edge: usize, rounds: usize) -> Result<()> {
         let mesh = self.read_mesh(edge)?;
         let turn = || -> Result<Vec<Line>> {
@@ -271,7 +271,7 @@ impl Runs {
         table.text()
     }
 
-    /// Whether temperatures agree; `notes` names those that do not.
+    /// Returns true if the temperatures agree; `notes` names those that do not.
     fn passed(&self, notes: &mut String) -> bool {
         let before = notes.len();
         // NaN is no agreement

@@ -10,7 +10,7 @@ use miette::{IntoDiagnostic, Result, WrapErr, miette};
 /// Names another program than `ccx`.
 const VARIABLE: &str = "CCX";
 
-/// Where it is.
+/// Installation of CalculiX.
 pub struct Calculix {
     program: PathBuf,
 }
@@ -23,16 +23,16 @@ pub struct Mesh {
     sides: Vec<(u64, u8)>,
 }
 
-/// One run.
+/// Result of a run.
 pub struct Run {
-    /// From start to end of the program.
+    /// Wall time of the program, s.
     pub seconds: f64,
-    /// Of all nodes after the last step, K.
+    /// Temperatures of all nodes after the last step, K.
     pub temperatures: Vec<f64>,
 }
 
 impl Mesh {
-    /// From a file as `crates/crystfem/benches/brick.rs` writes it.
+    /// Creates the input from a file as `crates/crystfem/benches/brick.rs` writes it.
     pub fn new(file: &str, text: &str, nodes: u64) -> Self {
         let (mut sides, mut inside) = (Vec::new(), false);
         for line in text.lines() {

@@ -18,7 +18,7 @@ const EDGES: &str = "26,45,66,99";
 const BRICK: &str = "brick";
 const DISTORTED: &str = "distorted";
 
-/// One curve: its name, and at each length of steps or tolerance what was measured.
+/// Curve: its name, and the measurements at each step length or tolerance.
 type Curve = (String, Vec<(String, BTreeMap<String, f64>)>);
 
 /// Rows, tables, and whether other programs agree on the brick. `arguments` are names of parts (default: all) and edges
@@ -64,11 +64,11 @@ pub fn run(workspace: &Workspace, folder: &Path, arguments: &[String]) -> Result
     Ok((all, text, passed))
 }
 
-/// One of the measurements of `crates/crystfem/benches/measure.rs`.
+/// Measurement of `crates/crystfem/benches/measure.rs`.
 struct Part {
     name: &'static str,
     title: &'static str,
-    /// Of a table.
+    /// Heading of the table.
     heading: [&'static str; 6],
     /// Other quantities than error and time that are shown.
     more: [&'static str; 2],

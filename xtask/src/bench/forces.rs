@@ -37,14 +37,14 @@ impl Snapshot {
         })
     }
 
-    /// Where the particles are: position + displacement, m.
+    /// Current places of the particles: position + displacement, m.
     pub fn places(&self) -> impl Iterator<Item = [f64; 3]> + '_ {
         let pairs = self.positions.iter().zip(&self.displacements);
         pairs.map(|(x, u)| [x[0] + u[0], x[1] + u[1], x[2] + u[2]])
     }
 }
 
-/// How far forces are apart.
+/// Difference between two sets of forces.
 #[derive(Debug, PartialEq)]
 pub struct Difference {
     /// max |Δf| over the root mean square of |f|.

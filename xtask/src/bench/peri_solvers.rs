@@ -13,7 +13,7 @@ use crate::workspace::Workspace;
 /// Distances of particles, mm, unless the user gives others.
 const SPACINGS: &str = "10,5,2";
 
-/// One method at one tolerance, on one lattice.
+/// Run of one method at one tolerance, on one lattice.
 #[derive(Default)]
 struct Point {
     tolerance: String,

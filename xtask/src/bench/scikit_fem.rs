@@ -11,12 +11,12 @@ use crate::workspace::Workspace;
 /// Names another virtual environment than target/venv-scikit-fem.
 const VARIABLE: &str = "SCIKIT_FEM_VENV";
 
-/// Where it is.
+/// Installation of scikit-fem.
 pub struct ScikitFem {
     python: PathBuf,
 }
 
-/// What brick.py prints; temperatures are in scikit-fem.csv.
+/// Numbers that brick.py prints; temperatures are in scikit-fem.csv.
 #[derive(Deserialize)]
 pub struct Figures {
     /// Seconds for the constant matrices.

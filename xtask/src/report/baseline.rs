@@ -1,4 +1,4 @@
-//! What moved since an earlier report.json, and by how much.
+//! Differences from an earlier report.json.
 
 use std::collections::BTreeMap;
 use std::fs;

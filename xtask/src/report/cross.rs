@@ -48,7 +48,7 @@ pub struct Crossed {
     what: String,
     value: String,
     asked: String,
-    /// When, where and from which commit.
+    /// Date, machine and commit of the measurement.
     measured: String,
     verdict: &'static str,
     tone: &'static str,
@@ -57,7 +57,7 @@ pub struct Crossed {
 }
 
 impl Crossed {
-    /// For docs/validation.md.
+    /// Cells of the row in docs/validation.md.
     pub fn cells(&self) -> [String; 5] {
         [&self.title, &self.value, &self.asked, self.verdict, &self.measured].map(str::to_owned)
     }

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::evidence::{Finding, Found, Measured, Number, check, verdict};
 use crate::workspace::Workspace;
 
-/// What proves an erratum.
+/// Proof of an erratum.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Proof {
@@ -91,7 +91,7 @@ fn cells(line: &str) -> Vec<String> {
     cells
 }
 
-/// What is wrong between docs/errata.md and the proofs.
+/// Checks docs/errata.md against the proofs.
 pub fn faults(workspace: &Workspace, rows: &[Erratum], proofs: &[Proof]) -> Vec<String> {
     let mut faults = Vec::new();
     for row in rows {

@@ -1,4 +1,4 @@
-//! What a verdict rests on: quantities that cases are judged by, or numbers that tests have measured.
+//! Evidence of a verdict: quantities by which cases are judged, or numbers that tests have measured.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -16,12 +16,12 @@ use crate::workspace::Workspace;
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Number {
-    /// One that the case has an `[[expect]]` of, unless `judged` is false.
+    /// Quantity with an `[[expect]]` in its case, unless `judged` is false.
     pub quantity: String,
     /// False for a number that is only shown: a loading of which the thesis prints no figure.
     #[serde(default = "yes")]
     pub judged: bool,
-    /// In words, with its unit.
+    /// Description with the unit.
     pub what: String,
     /// Another case than that of the row.
     pub case: Option<String>,
@@ -39,7 +39,7 @@ fn yes() -> bool {
 pub struct Measured {
     /// The name that the test gives it by crate `evidence`.
     pub record: String,
-    /// In words, with its unit.
+    /// Description with the unit.
     pub what: String,
     /// The thesis' own figure, where it prints one.
     pub thesis: Option<String>,
@@ -48,21 +48,21 @@ pub struct Measured {
 /// A row of numbers: what it is, what was found, what was expected, the verdict.
 #[derive(Clone, Debug, Serialize)]
 pub struct Finding {
-    /// In words.
+    /// Description.
     pub what: String,
-    /// As found.
+    /// Value found.
     pub value: String,
-    /// What the case asks for.
+    /// Value that the case requires.
     pub asked: String,
     /// The thesis' figure, if any.
     pub thesis: String,
-    /// Where from: a case's quantity, or a test.
+    /// Source: a case's quantity, or a test.
     pub from: String,
-    /// How it ended.
+    /// State of the number.
     pub state: State,
 }
 
-/// How a number was found.
+/// State of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum State {
@@ -70,11 +70,11 @@ pub enum State {
     Met,
     /// Within the tolerance of our own earlier figure, which is no evidence.
     Regression,
-    /// By this run; nothing is asked of it.
+    /// Measured by this run, without a requirement.
     Found,
     /// Outside its tolerance; or the case failed.
     Missed,
-    /// By a test whose sources have changed since.
+    /// Measured by a test whose sources have changed since.
     Stale,
     /// Not in this run.
     NotRun,
@@ -163,13 +163,13 @@ impl Measured {
     }
 }
 
-/// What was found: by this run's cases, and by the last run of the tests.
+/// Numbers of this run's cases and of the last run of the tests.
 pub struct Found<'a> {
-    /// Of the cases.
+    /// Outcomes of the cases.
     pub outcomes: &'a [Outcome],
-    /// Of the tests.
+    /// Records of the tests.
     pub records: &'a Records,
-    /// Of the workspace.
+    /// Root of the repository.
     pub root: &'a Path,
 }
 
@@ -228,7 +228,7 @@ fn expected(workspace: &Workspace, case: &str) -> Result<BTreeMap<String, Vec<Ki
     Ok(kinds)
 }
 
-/// Whether a file below crates/ or tests/ gives a number that name: a link, not a proof.
+/// Returns true if a file below crates/ or tests/ names the record: a link, not a proof.
 fn named(workspace: &Workspace, record: &str) -> bool {
     let name = format!("\"{record}\"");
     let mut folders = vec![workspace.root().join("crates"), workspace.root().join("tests")];

@@ -24,14 +24,13 @@ pub struct Other {
 }
 
 impl Other {
-    /// For docs/validation.md: case, what, source, figure with its tolerance, ours, verdict.
+    /// Cells of the row in docs/validation.md: case, quantity, source, figure with its tolerance, ours, verdict.
     pub fn cells(&self) -> [String; 6] {
         [&self.case, &self.quantity, &self.source, &self.figure, &self.ours, self.verdict].map(str::to_owned)
     }
 }
 
-/// What closed forms, publications and other programs say, of all cases in the folder. A regression there holds our own
-/// distance from another's figure: that figure is missed.
+/// Comparisons of all cases in the folder with closed forms, publications and other programs. A regression among them keeps our own distance from a foreign figure, which is therefore missed.
 pub fn figures(outcomes: &[Outcome]) -> Vec<Other> {
     let of_others = |kind| {
         matches!(kind, Kind::ClosedForm | Kind::Published | Kind::IndependentProgram | Kind::Regression)

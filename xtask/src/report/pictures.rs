@@ -27,7 +27,7 @@ pub struct Picture {
     pub href: String,
     /// The case file, from the root.
     pub file: String,
-    /// What makes it.
+    /// Command that draws it.
     pub command: String,
 }
 
@@ -132,7 +132,7 @@ fn average(pixels: &[u8], source: (usize, usize), target: (usize, usize), channe
     scaled
 }
 
-/// Which of `from` pixels, and how much of each, every one of `to` covers.
+/// Computes which of `from` pixels, and how much of each, every one of `to` pixels covers.
 fn spans(from: usize, to: usize) -> Vec<Vec<(usize, f64)>> {
     let ratio = from as f64 / to as f64;
     let span = |k: usize| {

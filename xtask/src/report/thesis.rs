@@ -10,7 +10,7 @@ use super::evidence::{Finding, Found, Measured, Number, check, verdict};
 use super::pictures::{Gallery, Picture};
 use crate::workspace::Workspace;
 
-/// What must have a row (issue 6): figures and tables with a result, and the appendices.
+/// Items that must have a row (issue 6): figures and tables with a result, and the appendices.
 pub const NUMBERED: &[&str] = &[
     "Fig. 2.6",
     "Fig. 2.7",
@@ -51,9 +51,9 @@ pub const NUMBERED: &[&str] = &[
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Map {
-    /// In the order of the thesis.
+    /// Rows in the order of the thesis.
     pub row: Vec<Row>,
-    /// What one program hands to another.
+    /// Transfers from one program to another.
     #[serde(default)]
     pub link: Vec<Row>,
     /// Numbers that prove the rows of docs/errata.md.
@@ -66,11 +66,11 @@ pub struct Map {
 pub struct Row {
     /// `Fig. 2.7`, `Print to stress`.
     pub number: String,
-    /// What it is.
+    /// Title of the row.
     pub title: String,
-    /// What the thesis shows, or a link does.
+    /// Result shown by the thesis, or transferred by a link.
     pub shows: String,
-    /// What we get.
+    /// Our result.
     pub ours: String,
     /// Claimed; holds only if its numbers do.
     pub verdict: Verdict,
@@ -89,15 +89,15 @@ pub struct Row {
     pub pictures: Vec<Vec<String>>,
 }
 
-/// What is claimed of a row.
+/// Claim of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
-    /// As the thesis shows it.
+    /// Agrees with the thesis.
     Reproduced,
-    /// Of a link: held against something that is not ours.
+    /// Verified against an external result (for a link).
     Verified,
-    /// With a difference that `because` states.
+    /// Differs, for the reason in `because`.
     Differs,
     /// The text does not say enough; `because` says what is missing.
     NotFromTheText,
@@ -113,9 +113,9 @@ pub struct Judged {
     shows: String,
     ours: String,
     because: Option<String>,
-    /// For a reader: `reproduced`.
+    /// Text for readers: `reproduced`.
     verdict: &'static str,
-    /// For the page: `good`, `fair`, `bad`, `open`.
+    /// Class on the page: `good`, `fair`, `bad`, `open`.
     tone: &'static str,
     findings: Vec<Finding>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -125,14 +125,14 @@ pub struct Judged {
 }
 
 impl Judged {
-    /// For the table in docs/validation.md.
+    /// Cells of the row in docs/validation.md.
     pub fn cells(&self) -> [String; 4] {
         let numbers: Vec<String> = self.findings.iter().map(|f| format!("{}: {}", f.what, f.value)).collect();
         let because = self.because.as_ref().map(|text| format!(": {text}")).unwrap_or_default();
         [self.number.clone(), self.title.clone(), numbers.join("; "), format!("{}{because}", self.verdict)]
     }
 
-    /// For a reader: `reproduced`.
+    /// Text for readers: `reproduced`.
     pub fn verdict(&self) -> &'static str {
         self.verdict
     }

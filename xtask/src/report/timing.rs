@@ -18,7 +18,7 @@ use crate::workspace::Workspace;
 /// The alternatives, cases/timing.toml.
 const FILE: &str = "cases/timing.toml";
 
-/// Where the points of a subject are.
+/// Source of the points of a subject.
 #[derive(Deserialize)]
 #[serde(rename_all = "lowercase", deny_unknown_fields)]
 enum Source {
@@ -41,13 +41,13 @@ struct Subject {
     title: String,
     #[serde(flatten)]
     source: Source,
-    /// What separates the name of a method from its setting in a point's name.
+    /// Separator of method and setting in a point's name.
     #[serde(default = "line_break")]
     split: String,
     /// The method that is taken where a scene names none.
     default: String,
     axes: [String; 2],
-    /// What measures it.
+    /// Command that measures it.
     command: String,
     #[serde(default)]
     note: String,
@@ -67,9 +67,9 @@ pub struct Measured {
     command: String,
     note: String,
     points: Vec<Point>,
-    /// Whether a point of the default is on the front.
+    /// True if a point of the default is on the front.
     default_on_front: bool,
-    /// When, where and from what a bench measured it; none of what this run's cases measured.
+    /// Provenance of a bench's measurement; `None` for measurements of this run's cases.
     #[serde(skip_serializing_if = "Option::is_none")]
     measured: Option<String>,
     /// The sources that the bench measured have changed.
@@ -85,10 +85,10 @@ pub struct Point {
     name: String,
     time: f64,
     error: f64,
-    /// Nothing measured is both faster and more exact.
+    /// True if no measured point is both faster and more accurate.
     front: bool,
     default: bool,
-    /// For a reader.
+    /// Values formatted for readers.
     shown: [String; 2],
 }
 
@@ -117,13 +117,13 @@ impl Measured {
         (!self.points.is_empty()).then_some(cells)
     }
 
-    /// What was not measured, and by what it is.
+    /// Names what was not measured, and the command that measures it.
     pub fn absent(&self) -> [&str; 2] {
         [&self.title, &self.command]
     }
 }
 
-/// Everything that was measured, and by what command the rest is; pictures go to `folder`.
+/// Collects all measurements, and the commands for missing ones; writes pictures to `folder`.
 pub fn measured(workspace: &Workspace, folder: &Path, outcomes: &[Outcome]) -> Result<Vec<Measured>> {
     let path = workspace.root().join(FILE);
     let text = fs::read_to_string(&path).into_diagnostic().wrap_err(FILE)?;

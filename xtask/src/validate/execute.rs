@@ -1,4 +1,4 @@
-//! One case, run by the released command line. Whatever goes wrong is the outcome of this case and of no other.
+//! Runs one case with the released command line. An error is the outcome of this case and of no other.
 
 use std::fs::{self, File};
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -15,9 +15,9 @@ use serde::{Deserialize, Serialize};
 use super::Case;
 use crate::outcome::Outcome;
 
-/// How cases are run.
+/// Settings for running cases.
 pub struct Settings {
-    /// Where results go.
+    /// Folder of the results.
     pub folder: PathBuf,
     /// Leave out what the cases mark `quick = false`.
     pub quick: bool,
@@ -28,18 +28,18 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// Where the results of an input of a case are: as far from those of the case as the scenes are apart.
+    /// Folder of the results of a case's input: in the same relation to the results of the case as the scenes.
     fn results(&self, case: &Case, input: &Path) -> PathBuf {
         self.folder.join(case.name_of(input))
     }
 }
 
-/// What a case was run from, beside its results: FOLDER.run.json.
+/// Provenance of a case's results, stored beside them: FOLDER.run.json.
 #[derive(Serialize, Deserialize)]
 struct RunStamp {
-    /// Of the case's folder, the executable and the tier.
+    /// Hash of the case's folder, the executable and the tier.
     fingerprint: String,
-    /// How long it took and how it failed; absent while it runs.
+    /// Duration and failure; `None` while the case runs.
     ended: Option<Ended>,
 }
 
@@ -120,7 +120,7 @@ fn heading(file: &Path) -> Result<(String, String)> {
     Ok((program, word("title").unwrap_or_default()))
 }
 
-/// Of the case file's text, the files beside it, the executable, the tier, and the results of its inputs.
+/// Hashes the case file, the files beside it, the executable, the tier, and the results of its inputs.
 fn fingerprint(settings: &Settings, case: &Case, executable: &Path) -> std::io::Result<String> {
     let mut hasher = DefaultHasher::new();
     (fs::read(&case.file)?, settings.quick).hash(&mut hasher);

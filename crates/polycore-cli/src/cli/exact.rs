@@ -12,7 +12,7 @@ use super::MPA;
 pub struct Arguments {
     /// The law: neo-hookean, mooney-rivlin, gent, ogden-1, ogden-2, ogden-3, three-chain, eight-chain, …
     law: String,
-    /// Its parameters in order, stresses with their unit ("0.27 MPa"); μ of Ogden in Abaqus' convention.
+    /// Parameters in order, stresses with their unit ("0.27 MPa"); μ of Ogden in Abaqus' convention.
     #[arg(required = true, allow_negative_numbers = true)]
     parameters: Vec<String>,
     /// The test.

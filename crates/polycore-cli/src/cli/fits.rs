@@ -98,7 +98,7 @@ pub fn run(case: &Case, run: &mut Run) -> Result<Finished, Error> {
     Ok(Finished { report, text })
 }
 
-/// In the unit of the tables: a stress in MPa, numbers as they are.
+/// Converts a value to the unit of the tables: stresses to MPa, numbers unchanged.
 fn scaled(value: f64, unit: &str) -> (f64, &'static str) {
     if unit == "Pa" { (value / MPA, "MPa") } else { (value, "") }
 }
@@ -151,7 +151,7 @@ fn record(report: &mut Report, data: &str, table: &TestData, fit: &Fit) -> Resul
     Ok(())
 }
 
-/// Where a law first is unstable over the stretches of a table: the test and its stretch.
+/// Finds the test and the stretch at which a law first becomes unstable, within the stretches of a table.
 fn unstable(fit: &Fit, table: &TestData) -> Option<(Mode, f64)> {
     let ends = stability::range(table);
     let all = Mode::TESTS.into_iter().flat_map(|mode| ends.map(|end| (mode, end)));
@@ -236,7 +236,7 @@ fn write_states(directory: &Path, name: &str, table: &TestData, fits: &[Fit]) ->
     output::csv::write(directory.join(format!("{name}_states.csv")), &columns)
 }
 
-/// How tables were read, rms by law and table, verdicts, the parameters, a block for `peri`, trials, then the expectations.
+/// Summary of a run: layout of the files, rms by law and table, verdicts, parameters, a material block for `peri`, trials, then the expectations.
 fn summary(case: &Case, all: &[Set], report: &Report) -> String {
     let mut text = format!("{}\n", case.title);
     for set in all {

@@ -1,4 +1,4 @@
-//! What a scene of `peri` takes of a fitted law.
+//! Material blocks for scenes of `peri`, from fitted laws.
 
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -109,7 +109,7 @@ pub fn write(directory: &Path, all: &[Set]) -> Result<(), Error> {
 /// Significant digits of parameters.
 pub const DIGITS: usize = 7;
 
-/// With its unit.
+/// Formats a stress with its unit.
 pub fn stress(value: f64, significant: usize) -> String {
     let (unit, scale) = unit_of(value);
     format!("{} {unit}", digits(value / scale, significant))

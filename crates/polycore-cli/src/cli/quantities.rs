@@ -1,7 +1,7 @@
 //! The scalars that reports of `polycore` can have.
 
 harness::quantities! {
-    /// Of fits, `{fit}` = DATA.LAW or, of a fit on other data, DATA.LAW.OTHER; of trials, `{trial}`.
+    /// Quantities of fits, `{fit}` = DATA.LAW or, for a fit judged on other data, DATA.LAW.OTHER; and of trials, `{trial}`.
     pub ALL:
     RMS = "{fit}.rms", "MPa", "root mean square of model − measurement";
     MAE = "{fit}.mae", "MPa", "mean of |model − measurement|";

@@ -22,7 +22,7 @@ struct Scene {
     /// Checked by its type only.
     #[serde(rename = "program")]
     _program: Program,
-    /// One line for tables and pictures.
+    /// Title for tables and pictures, one line.
     #[serde(default)]
     title: String,
     /// Fits.
@@ -49,7 +49,7 @@ enum Program {
 struct Fit {
     /// Names of laws; all of them if not given.
     laws: Option<Vec<String>>,
-    /// Whether a law fitted to one table is judged on the others, too.
+    /// Judge a law fitted to one table on the other tables, too.
     #[serde(default)]
     cross: bool,
     /// Tables of measurements.
@@ -61,7 +61,7 @@ struct Fit {
 #[derive(Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Data {
-    /// Its name in the report.
+    /// Name in the report.
     name: String,
     /// The CSV file, relative to the scene.
     file: PathBuf,
@@ -83,7 +83,7 @@ struct Data {
 pub struct DataSet {
     pub name: String,
     pub table: TestData,
-    /// How its file was understood, and what was left out of it, a line each.
+    /// Layout of the file, and the rows left out, one line each.
     pub read: Vec<String>,
 }
 
@@ -167,7 +167,7 @@ impl Case {
         Ok(case)
     }
 
-    /// What a run will do, in lines.
+    /// Describes what a run will do, in lines.
     pub fn plan(&self) -> String {
         let mut text = format!("{}: {}\n", self.source.path.display(), self.title);
         for DataSet { name, table, read } in &self.data {
@@ -247,7 +247,7 @@ fn selected(source: &Source, names: &[String]) -> Result<Vec<&'static ModelDescr
     Ok(laws)
 }
 
-/// What to take for a law of another name, or for what no law here is.
+/// Returns advice for an unknown name of a law, or for a property that no law here models.
 fn advice(name: &str) -> Option<&'static str> {
     let plain: String = name.to_lowercase().chars().filter(char::is_ascii_alphanumeric).collect();
     Some(match plain.as_str() {

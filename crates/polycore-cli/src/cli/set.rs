@@ -3,11 +3,11 @@
 use polycore::constitutive::hyperelastic::data::TestData;
 use polycore::constitutive::hyperelastic::fit::{Agreement, Fit};
 
-/// What was fitted to one table.
+/// Fits to one table.
 pub struct Set<'a> {
     pub name: &'a str,
     pub table: &'a TestData,
-    /// How the file was understood.
+    /// Layout of the file.
     pub read: &'a [String],
     pub fits: Vec<Fit>,
     /// Laws that could not be fitted, and why.

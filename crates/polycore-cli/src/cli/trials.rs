@@ -15,17 +15,17 @@ use serde::Deserialize;
 
 use super::{MPA, quantities as q};
 
-/// One trial: with `parameters` a law is evaluated at a `stretch`, with `data` it is fitted.
+/// Trial: with `parameters` a law is evaluated at a `stretch`, with `data` it is fitted.
 #[derive(Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Trial {
-    /// Its name in the report.
+    /// Name in the report.
     name: String,
     /// Expected behaviour, in words.
     description: String,
     /// The law's name.
     law: String,
-    /// Its parameters, in their order.
+    /// Parameters, in the order of the law.
     parameters: Option<Vec<Number>>,
     /// The test.
     #[serde(default = "uniaxial")]
@@ -44,7 +44,7 @@ pub struct Trial {
 #[derive(Deserialize, schemars::JsonSchema)]
 #[serde(untagged)]
 enum Number {
-    /// With its unit.
+    /// Number with its unit.
     Stress(Stress),
     /// Without.
     Plain(f64),

@@ -6,7 +6,7 @@ use super::{Error, Flags, Law, Prediction, Workspace};
 use crate::tensor::Voigt;
 use ndarray::{Array1, Array2, Array3, ArrayView1, ArrayView2};
 
-/// What a law predicts at N points.
+/// Predictions of a law at N points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Predictions {
     /// S, (N, 6), Pa.

@@ -1,9 +1,9 @@
-//! What laws refuse.
+//! Errors of constitutive laws, their fits, tables and files.
 
 use crate::tensor;
 use std::path::PathBuf;
 
-/// What a law, a fit, a table or a file of a model refuses.
+/// Error of a law, a fit, a table of test data or a model file.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -16,7 +16,7 @@ pub enum Error {
         parameter: String,
         /// The value given.
         value: f64,
-        /// Where it may lie.
+        /// Allowed range.
         allowed: &'static str,
     },
     /// The chains are fully extended: energy and stress are infinite from here on.
@@ -24,9 +24,9 @@ pub enum Error {
     Locked {
         /// The law.
         law: &'static str,
-        /// What has grown too large.
+        /// Quantity that reached its limit.
         quantity: &'static str,
-        /// Its value.
+        /// Value of the quantity.
         value: f64,
         /// The limit.
         limit: f64,
@@ -54,7 +54,7 @@ pub enum Error {
     /// An iteration did not converge.
     #[error("{iteration} did not converge in {steps} steps (residual {residual:e})")]
     NoConvergence {
-        /// Which one.
+        /// Name of the iteration.
         iteration: &'static str,
         /// Steps done.
         steps: usize,
@@ -69,17 +69,17 @@ pub enum Error {
     Data {
         /// The file, table or row.
         what: String,
-        /// What is wrong with it.
+        /// Defect of the data.
         reason: String,
     },
     /// A C that is no deformation, or a part of a model that does not fit the others.
     #[error("{name}: found {found}; allowed: {allowed}")]
     Invalid {
-        /// What.
+        /// Name of the quantity.
         name: &'static str,
         /// The value found.
         found: String,
-        /// What is allowed.
+        /// Allowed values.
         allowed: String,
     },
     /// A file that holds no model.
@@ -87,9 +87,9 @@ pub enum Error {
     File {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// Defect of the content.
         found: String,
-        /// What it should be.
+        /// Expected content.
         allowed: String,
     },
     /// The deformation is not admissible.

@@ -12,7 +12,7 @@ use std::any::Any;
 /// as a function of C has none), and S(1) need not vanish: incompressible laws leave the pressure open, and return as S the
 /// part that W determines.
 pub trait Law: Send + Sync {
-    /// Its name, for tables and messages.
+    /// Name of the law, for tables and messages.
     fn name(&self) -> String;
 
     /// W and S at C. Allocates nothing once `memory` has served the same law.
@@ -83,7 +83,7 @@ pub struct Moduli {
     pub shear: f64,
 }
 
-/// What a law predicts at a C, and how uncertain that is.
+/// Prediction of a law at a C, with its uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Prediction<T: Scalar = f64> {
     /// S (3.3), Pa.
@@ -102,12 +102,12 @@ pub struct Prediction<T: Scalar = f64> {
     pub flags: Flags,
 }
 
-/// Why a prediction is uncertain.
+/// Reasons for which a prediction is uncertain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Flags {
     /// Components of C outside the box of the training data.
     pub outside: [bool; 6],
-    /// Of those, the ones that never changed in the training data: shear that was never seen, for example.
+    /// Components outside the range that never changed in the training data, e.g. a shear without any data.
     pub unseen: [bool; 6],
     /// Farther from the representatives of the training strains than any training row: in a gap of the box.
     pub far: bool,
@@ -116,14 +116,13 @@ pub struct Flags {
 }
 
 impl Flags {
-    /// Whether there is any.
+    /// Returns true if any flag is set.
     pub fn any(&self) -> bool {
         self.outside.contains(&true) || self.far || self.spread
     }
 }
 
-/// Memory in which a law works, kept between its evaluations so that they need not allocate. Keep one for each law and
-/// thread: whatever another law left there is dropped.
+/// Scratch memory of a law, kept between its evaluations so that they need not allocate. Keep one for each law and thread: content of another law is dropped.
 #[derive(Debug, Default)]
 pub struct Workspace(Option<Box<dyn Any + Send>>);
 

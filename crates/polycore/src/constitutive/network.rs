@@ -30,7 +30,7 @@ pub const MOST_NEURONS: usize = 1 << 16;
 pub struct Architecture {
     /// Neurons of each layer, the inputs first.
     pub widths: Vec<usize>,
-    /// One for each layer after the input.
+    /// Activation of each layer after the input.
     pub activations: Vec<Activation>,
 }
 
@@ -81,14 +81,14 @@ impl Architecture {
     }
 }
 
-/// One layer: activation(W x + b).
+/// Layer of a network: activation(W x + b).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layer<T> {
     /// W, (outputs, inputs), row by row.
     pub weights: Vec<T>,
     /// b, (outputs).
     pub bias: Vec<T>,
-    /// What follows the sum.
+    /// Activation applied to the sum.
     pub activation: Activation,
 }
 
@@ -156,12 +156,12 @@ impl<T: Real> Network<T> {
         Self::new(architecture, layers)
     }
 
-    /// Its widths and activations.
+    /// Widths and activations.
     pub fn architecture(&self) -> &Architecture {
         &self.architecture
     }
 
-    /// Its layers from the input on.
+    /// Layers from the input on.
     pub fn layers(&self) -> &[Layer<T>] {
         &self.layers
     }

@@ -59,19 +59,19 @@ pub struct Surrogate<T: Real = f64> {
     /// C → material axes, row by row; none for the axes of the data.
     turn: Option<[[T; 6]; 6]>,
     nearest: Option<Nearest<T>>,
-    /// Of each member of an energy, so that W(I) = 0 and S(I) = 0.
+    /// Terms of each member of an energy such that W(I) = 0 and S(I) = 0.
     rest: Vec<RestTerm<T>>,
 }
 
-/// What is kept between evaluations.
+/// Scratch kept between evaluations.
 #[derive(Default)]
 struct Memory<T> {
     tape: Tape<T>,
-    /// Of each member (and in a batch of each point of it) energy and ∂W/∂c, or S.
+    /// Energy and ∂W/∂c, or S, of each member (and in a batch of each point of it).
     parts: Vec<(T, [T; 6])>,
 }
 
-/// What is taken from a member's energy: its value at I and a function that is linear in c or in the invariants.
+/// Terms subtracted from a member's energy: its value at I, and a function linear in c or in the invariants.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct RestTerm<T> {
     /// W at I.
@@ -84,20 +84,20 @@ pub struct RestTerm<T> {
     pub at: [T; LANES],
 }
 
-/// The numbers of a model beside its weights, in the form in which it is evaluated: what exporters write.
+/// Numbers of a model beside its weights, in the form used by evaluation and exporters.
 #[derive(Debug, Clone, Copy)]
 pub struct Coefficients<'a, T> {
-    /// Taken from each input.
+    /// Mean of each input, subtracted first.
     pub mean: &'a [T],
-    /// What each input is then multiplied with; 0 for one without variance.
+    /// Factor of each input, applied after `mean` is subtracted; 0 for one without variance.
     pub inverse: &'a [T],
     /// Added to the outputs of an `ann`.
     pub output_mean: &'a [T],
-    /// What the outputs are multiplied with before.
+    /// Factor of the outputs, applied before `output_mean` is added.
     pub output: &'a [T],
-    /// From C to the material axes, row by row; none for the axes of the data.
+    /// Transformation of C to the material axes, row by row; `None` for the axes of the data.
     pub turn: Option<&'a [[T; 6]; 6]>,
-    /// Of each member of an energy.
+    /// Terms of each member of an energy.
     pub rest: &'a [RestTerm<T>],
     /// Distance in standard deviations beyond which a C is far from all representatives of the training strains.
     pub farthest: Option<f64>,
@@ -239,7 +239,7 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         rest
     }
 
-    /// Everything but the weights.
+    /// Metadata of the model: everything but the weights.
     pub fn header(&self) -> &Header {
         &self.header
     }
@@ -275,7 +275,7 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         }
     }
 
-    /// Which components of C leave the training data; for the spread see [`Surrogate::stress`].
+    /// Flags components of C outside the training data; for the spread see [`Surrogate::stress`].
     pub fn flags(&self, c: &SVector<T, 6>) -> Flags {
         let mut flags = Flags::default();
         for (a, [low, high]) in self.header.training_box.iter().enumerate() {

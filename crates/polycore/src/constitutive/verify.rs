@@ -1,4 +1,4 @@
-//! What every law must keep, measured on any [`Law`]: one battery of tests for all of them, and for yours.
+//! Checks of the properties that every law must have, for any [`Law`], including your own.
 
 use super::law::IDENTITY;
 use super::{Error, Law, Prediction, Workspace};
@@ -13,21 +13,21 @@ const STEP: f64 = 1e-5;
 /// relative to the law's size there: the largest component of S and ℂ, and |W|.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Deviations {
-    /// Of S from 2 ∂W/∂C by central differences; none of a law without an energy.
+    /// Deviation of S from 2 ∂W/∂C by central differences; `None` for a law without an energy.
     pub stress: Option<f64>,
-    /// Of ℂ from 2 ∂S/∂C by central differences.
+    /// Deviation of ℂ from 2 ∂S/∂C by central differences.
     pub tangent: f64,
-    /// Of ℂ from its transpose: 0 for a law that has an energy.
+    /// Deviation of ℂ from its transpose: 0 for a law that has an energy.
     pub asymmetry: f64,
     /// ‖σ(QF) − Qσ(F)Qᵀ‖ for a rotation Q.
     pub objectivity: f64,
-    /// Of a stress alone from the stress with its tangent, and of a list from single points: 0, the same bits.
+    /// Deviation of a stress alone from the stress with its tangent, and of a list from single points: 0, the same bits.
     pub bits: f64,
     /// |W(1)| over the size there; none of a law without an energy.
     pub energy_at_rest: Option<f64>,
-    /// Of S(1) from zero.
+    /// Deviation of S(1) from zero.
     pub stress_at_rest: f64,
-    /// Of S(1) from a pressure: 0 for an isotropic law, also where the pressure is left open.
+    /// Deviation of S(1) from a pressure: 0 for an isotropic law, also if the pressure is left open.
     pub shear_at_rest: f64,
 }
 
@@ -61,7 +61,7 @@ impl Deviations {
         Ok(all)
     }
 
-    /// At one C; returns the law's size there.
+    /// Measures the law at one C; returns its size there.
     fn at(
         &mut self,
         law: &dyn Law,
@@ -98,11 +98,10 @@ impl Deviations {
     }
 }
 
-/// At how many of `count` random deformations and directions waves have no real speed: the law has lost its ellipticity
-/// there, (m ⊗ N) : ∂P/∂F : (m ⊗ N) < 0 beyond rounding. Strains go up to several hundred per cent.
+/// Counts, among `count` random deformations and directions, the states without a real wave speed: the law has lost its ellipticity there, (m ⊗ N) : ∂P/∂F : (m ⊗ N) < 0 beyond rounding. Strains go up to several hundred per cent.
 ///
 /// # Errors
-/// What the law refuses.
+/// Errors of the law.
 pub fn count_ellipticity_losses(
     law: &dyn Law,
     count: usize,

@@ -75,7 +75,7 @@ impl Inverse {
         }
     }
 
-    /// Where it was published: a DOI, or the work where there is none.
+    /// Publication: a DOI, or the work if it has none.
     pub const fn source(self) -> &'static str {
         match self {
             Self::Exact => "this crate",

@@ -14,7 +14,7 @@ use faer::{Conj, MatMut, Par, Side};
 /// Places of the entries of an upper triangle: column by column, rows ascending.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Pattern {
-    /// Where each column starts, and the number of entries.
+    /// Start of each column, and the number of entries.
     pub starts: Vec<usize>,
     /// Row of each entry.
     pub rows: Vec<usize>,

@@ -5,7 +5,7 @@
 pub struct DisjointSets(Vec<u32>);
 
 impl DisjointSets {
-    /// So many numbers.
+    /// Creates `count` sets of one number each.
     pub fn new(count: usize) -> Self {
         Self((0..count as u32).collect())
     }
@@ -28,7 +28,7 @@ impl DisjointSets {
         a != b
     }
 
-    /// Whether a number stands for its set.
+    /// Returns true if the number represents its set.
     pub fn is_root(&self, number: u32) -> bool {
         self.0[number as usize] == number
     }

@@ -5,7 +5,7 @@ use crate::units::is_unit;
 /// The heading of a column.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Heading {
-    /// As it stands in the file.
+    /// Text of the heading in the file.
     pub text: String,
     /// Without its unit.
     pub name: String,

@@ -1,4 +1,4 @@
-//! How a text is a table: separator, decimal sign, headings.
+//! Layout of a table: separator, decimal sign, headings.
 
 use super::heading::plain_unit;
 use crate::units::is_unit;
@@ -7,20 +7,20 @@ use std::fmt;
 /// Lines that are looked at before the first is read.
 const SAMPLE: usize = 1000;
 
-/// What stands between cells.
+/// Separator of cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Separator {
-    /// One character.
+    /// Single character.
     Sign(char),
     /// Blanks and tabs, any number of them.
     Blanks,
 }
 
-/// In the order in which they are taken where both would do.
+/// Separators in order of preference.
 const SEPARATORS: [Separator; 4] =
     [Separator::Sign('\t'), Separator::Sign(';'), Separator::Sign(','), Separator::Blanks];
 
-/// What stands before the decimals.
+/// Decimal sign.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Decimal {
     /// 0.5
@@ -29,7 +29,7 @@ pub enum Decimal {
     Comma,
 }
 
-/// How a table is written.
+/// Layout of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Layout {
     /// Between cells.
@@ -170,7 +170,7 @@ fn is_number(cell: &str) -> bool {
     Decimal::Point.number(cell).or_else(|| Decimal::Comma.number(cell)).is_some()
 }
 
-/// Whether a line is a remark wherever it stands.
+/// Returns true if a line is a remark wherever it stands.
 pub(super) fn is_comment(line: &str) -> bool {
     let line = line.trim_start();
     let percent = line.strip_prefix('%').is_some_and(|rest| rest.trim_start_matches('%').starts_with(' '));
@@ -272,7 +272,7 @@ impl Heads {
     }
 }
 
-/// Whether a row is one of units: every cell that is not blank is one, and one of them is more than a dash.
+/// Returns true for a row of units: every cell that is not blank is one, and at least one is more than a dash.
 fn is_units(row: &csv::StringRecord) -> bool {
     let real = row.iter().any(|cell| is_unit(&plain_unit(cell)));
     let unit = |cell: &str| plain_unit(cell).is_empty() || is_unit(&plain_unit(cell));

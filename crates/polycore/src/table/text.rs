@@ -1,4 +1,4 @@
-//! From bytes to lines.
+//! Decoding of bytes to lines.
 
 /// The text and the name of its encoding; where it is no text, what it is and what to do.
 pub(super) fn decode(bytes: Vec<u8>) -> Result<(String, &'static str), [&'static str; 2]> {

@@ -97,7 +97,7 @@ pub(super) fn principal_frame(f: &Tensor) -> PrincipalFrame {
 /// Three columns need about five sweeps; convergence is quadratic.
 const MAX_SWEEPS: usize = 30;
 
-/// One Jacobi rotation of columns i and j; false if they were orthogonal to working precision.
+/// Applies one Jacobi rotation of columns i and j; returns false if they were orthogonal to working precision.
 fn orthogonalise(columns: &mut Tensor, rotation: &mut Tensor, i: usize, j: usize) -> bool {
     let (x, y) = (columns.column(i).into_owned(), columns.column(j).into_owned());
     let (a, b, c) = (x.norm(), y.norm(), x.dot(&y));

@@ -87,9 +87,7 @@ pub fn cauchy_from_material(deformation: &DeformationGradient, second_piola_kirc
     from_stress(&deformation.convert_stress(&s, SecondPiolaKirchhoff, Cauchy))
 }
 
-/// What Abaqus' UMAT asks for (DDSDDE at finite strain): the tangent of the Jaumann rate of the Kirchhoff stress over J,
-/// F_iI F_jJ F_kK F_lL ℂ_IJKL / J + ½(σ_ik δ_jl + σ_jk δ_il + σ_il δ_jk + σ_jl δ_ik), in the unit of ℂ, from S and
-/// ℂ = 2 ∂S/∂C (Sun, Chaikof & Levenston 2008, <https://doi.org/10.1115/1.2979872>).
+/// Tangent of the Jaumann rate of the Kirchhoff stress over J, as Abaqus' UMAT needs it (DDSDDE at finite strain): F_iI F_jJ F_kK F_lL ℂ_IJKL / J + ½(σ_ik δ_jl + σ_jk δ_il + σ_il δ_jk + σ_jl δ_ik), in the unit of ℂ, from S and ℂ = 2 ∂S/∂C (Sun, Chaikof & Levenston 2008, <https://doi.org/10.1115/1.2979872>).
 pub fn jaumann_tangent(
     deformation: &DeformationGradient,
     second_piola_kirchhoff: &Voigt,

@@ -5,7 +5,7 @@ use super::{Dimension, Exponents, name_of};
 /// A text that is not the quantity a scene asks for.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum UnitError {
-    /// Nothing there.
+    /// Empty text.
     #[error("empty; a number with a unit is needed")]
     Empty,
     /// The text does not begin with a number.
@@ -21,7 +21,7 @@ pub enum UnitError {
     Bare {
         /// The whole text.
         text: String,
-        /// What is needed, with its article.
+        /// Quantity needed, with its article.
         name: &'static str,
         /// A valid input.
         example: &'static str,
@@ -41,7 +41,7 @@ pub enum UnitError {
     Grammar {
         /// The whole text.
         text: String,
-        /// What is wrong.
+        /// Defect of the unit.
         problem: String,
     },
     /// Another dimension than the one needed.
@@ -49,9 +49,9 @@ pub enum UnitError {
     Dimension {
         /// The whole text.
         text: String,
-        /// What was found, with its article.
+        /// Quantity found, with its article.
         found: String,
-        /// What is needed, with its article.
+        /// Quantity needed, with its article.
         needed: &'static str,
         /// A valid input.
         example: &'static str,
@@ -69,7 +69,7 @@ pub enum UnitError {
     Range {
         /// The whole text.
         text: String,
-        /// What is wrong.
+        /// Defect of the number.
         problem: &'static str,
     },
 }

@@ -283,7 +283,7 @@ impl Hyperelastic for EightChainRootI2 {
     }
 }
 
-/// One chain at relative extension x = λ/√n: β = 𝓛⁻¹(x) and the free energy f = xβ + ln(β/sinh β) per link and kθ.
+/// State of one chain at relative extension x = λ/√n: β = 𝓛⁻¹(x) and free energy f = xβ + ln(β/sinh β) per link and kθ.
 struct Extension {
     x: f64,
     beta: f64,

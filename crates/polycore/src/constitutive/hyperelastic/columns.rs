@@ -1,4 +1,4 @@
-//! Which columns of a table are strains and stresses, and of what kind.
+//! Strain and stress columns of a table, recognised by their headings.
 
 use super::data::Mode;
 use crate::table::{Heading, plainly};
@@ -29,11 +29,11 @@ pub enum TestStressMeasure {
     True,
 }
 
-/// What a heading says of its column.
+/// Role of a column, read from its heading.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Role {
     pub what: What,
-    /// Of stretch_1, stretch_2 …: 0, 1.
+    /// Index of the axis: 0 for `stretch_1`, 1 for `stretch_2`.
     pub axis: Option<usize>,
     /// The axis is a number, which may also be that of a specimen.
     pub numbered: bool,
@@ -94,7 +94,7 @@ pub(super) const MODES: [&str; 9] = [
 ];
 
 impl Role {
-    /// Nothing of a heading that is none of these.
+    /// Returns the role that a heading names, or `None` if it names none.
     pub fn from_heading(heading: &Heading) -> Option<Self> {
         let (plain, unit) = suffixed(heading);
         let words: Vec<&str> = plain.split(' ').collect();

@@ -15,7 +15,7 @@ pub struct Compressible<L> {
     volumetric: Volumetric,
 }
 
-/// Which g stands before ln J.
+/// Factor g before ln J.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Coupling {
     /// The one that makes F = 1 stress free.
@@ -64,7 +64,7 @@ impl<L: Hyperelastic> Compressible<L> {
         Self::with_coupling(law, volumetric, Coupling::StressFree)
     }
 
-    /// As [`Compressible::new`], with a choice of g.
+    /// Builds the law with a choice of g.
     ///
     /// # Errors
     /// Also [`Error::NotPublished`] if the thesis has no compressible form of that law.

@@ -6,7 +6,7 @@ use super::homogeneous::incompressible;
 /// A table of homogeneous states.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TestData {
-    /// Where the numbers come from: the `# source:` line of the file; empty without one.
+    /// Source of the numbers: the `# source:` line of the file, or empty.
     pub source: String,
     /// The states, in the order of the file.
     pub states: Vec<TestState>,
@@ -32,7 +32,7 @@ impl Mode {
     /// The tests that one stretch describes.
     pub const TESTS: [Self; 3] = [Self::Uniaxial, Self::Equibiaxial, Self::PureShear];
 
-    /// As tables and scenes write it.
+    /// Name of the test in tables and scenes.
     pub fn name(self) -> &'static str {
         match self {
             Self::Uniaxial => "uniaxial",
@@ -55,7 +55,7 @@ impl Mode {
 /// Two principal stretches (λ₃ = 1/(λ₁λ₂)) and their nominal stresses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TestState {
-    /// Its test.
+    /// Type of test.
     pub mode: Mode,
     /// λ₁, λ₂.
     pub stretches: [f64; 2],
@@ -78,7 +78,7 @@ impl TestData {
         Ok(table)
     }
 
-    /// How many stresses were measured: those that are not exactly zero.
+    /// Number of measured stresses, i.e. of those that are not exactly zero.
     pub fn measurements(&self) -> usize {
         self.states.iter().flat_map(|state| state.nominal).filter(|nominal| *nominal != 0.0).count()
     }

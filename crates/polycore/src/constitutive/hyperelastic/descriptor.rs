@@ -1,4 +1,4 @@
-//! How a law is named, built from numbers, and started in a fit.
+//! Descriptors of laws: names, constructors, and starting points of fits.
 
 use super::data::TestData;
 use super::{Error, Hyperelastic};
@@ -10,7 +10,7 @@ type Build = fn(&[f64]) -> Result<Box<dyn Hyperelastic>, Error>;
 pub struct ModelDescriptor {
     /// The name in scenes and reports.
     pub key: &'static str,
-    /// Where it comes from.
+    /// Category of the law.
     pub kind: ModelKind,
     /// Names, units and domains of the parameters.
     pub parameters: &'static [Parameter],
@@ -18,7 +18,7 @@ pub struct ModelDescriptor {
     pub(super) build: Build,
     /// Plausible values for a rubber.
     pub example: &'static [f64],
-    /// Where fits start.
+    /// Starting points of fits.
     pub(super) starts: fn(&Start<'_>) -> Vec<Vec<f64>>,
     /// Laws that this one becomes at some parameters: it fits no worse than they do.
     pub(super) contains: &'static [Contained],
@@ -28,19 +28,19 @@ pub struct ModelDescriptor {
     pub(super) refine: Option<Refine>,
 }
 
-/// Of parameters, better ones.
+/// Maps parameters to better ones.
 pub(super) type Refine = fn(&[f64], &Start<'_>) -> Vec<f64>;
 
 /// A law inside another one.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Contained {
-    /// Its name.
+    /// Key of the inner law.
     pub key: &'static str,
-    /// Of its best parameters: those of the outer law at which it is this one, or indistinguishable from it, and more starts.
+    /// Maps the best parameters of the inner law to those of the outer law at which both agree (or cannot be distinguished), followed by more starting points.
     pub embed: fn(&[f64], &Start<'_>) -> Vec<Vec<f64>>,
 }
 
-/// Of parameters and λ₁, λ₂: P₁, P₂ and, for each parameter, their derivatives.
+/// Computes P₁, P₂ and their derivatives with respect to each parameter, from the parameters and λ₁, λ₂.
 pub(super) type Slopes = fn(&[f64], [f64; 2], &mut [[f64; 2]]) -> [f64; 2];
 
 /// Share of a modulus at which a term is absent.
@@ -52,13 +52,13 @@ pub(super) const UNLIMITED: f64 = 1e6;
 /// The thesis' two categories of laws (§1.1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ModelKind {
-    /// In invariants or stretches, chosen to fit.
+    /// Written in invariants or stretches, chosen to fit data.
     Phenomenological,
-    /// From the statistics of a network of chains.
+    /// Derived from the statistics of a network of chains.
     Micromechanical,
 }
 
-/// What is known before a fit.
+/// Data available before a fit.
 pub(super) struct Start<'a> {
     /// Lower limit of each parameter.
     pub limits: &'a [f64],
@@ -66,18 +66,18 @@ pub(super) struct Start<'a> {
     pub modulus: f64,
     /// The data.
     pub table: &'a TestData,
-    /// Whether the user asks the fit to end.
+    /// Returns true if the user asks the fit to stop.
     pub stop: &'a dyn Fn() -> bool,
 }
 
 /// A material parameter.
 #[derive(Debug, Clone, Copy)]
 pub struct Parameter {
-    /// Its name.
+    /// Name of the parameter.
     pub name: &'static str,
     /// `Pa` or `1`.
     pub unit: &'static str,
-    /// Where it may lie.
+    /// Admissible values.
     pub domain: Domain,
 }
 

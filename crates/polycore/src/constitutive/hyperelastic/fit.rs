@@ -20,9 +20,9 @@ use crate::numerics::least_squares::{Optimum, levenberg_marquardt};
 pub struct Fit {
     /// The law.
     pub law: Box<dyn Hyperelastic>,
-    /// Its model.
+    /// Model that was fitted.
     pub model: &'static ModelDescriptor,
-    /// Its parameters.
+    /// Parameters of the law.
     pub parameters: Vec<FittedParameter>,
     /// Root mean square of the residuals over the measured stresses, Pa.
     pub rms: f64,
@@ -40,16 +40,15 @@ pub struct Fit {
 /// A fitted parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FittedParameter {
-    /// Its name.
+    /// Name of the parameter.
     pub name: &'static str,
     /// `Pa` or `1`.
     pub unit: &'static str,
-    /// In that unit.
+    /// Value in `unit`.
     pub value: f64,
-    /// From s²(JᵀJ)⁻¹ at the minimum, s² = Σr²/(m − k); `None` if the data do not determine the parameter: it sits at
-    /// an end of its domain, which for a locking limit is 1e6 × the least value allowed.
+    /// Standard error from s²(JᵀJ)⁻¹ at the minimum, s² = Σr²/(m − k). `None` if the data do not determine the parameter: it lies at an end of its domain, which for a locking limit is 1e6 × the least admissible value.
     pub standard_error: Option<f64>,
-    /// Whether the data say anything of it.
+    /// Verdict of the data on the parameter.
     pub identifiability: Identifiability,
 }
 
@@ -62,7 +61,7 @@ pub fn rms<L: Hyperelastic + ?Sized>(law: &L, table: &TestData) -> Result<f64, E
     Ok((residuals.iter().map(|r| r * r).sum::<f64>() / residuals.len() as f64).sqrt())
 }
 
-/// How a law follows the measured stresses of a table.
+/// Agreement of a law with the measured stresses of a table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Agreement {
     /// Root mean square of the residuals, Pa.
@@ -74,7 +73,7 @@ pub struct Agreement {
 }
 
 impl Agreement {
-    /// Of a law and a table.
+    /// Compares a law with test data.
     ///
     /// # Errors
     /// As [`residuals`]: at a state beyond locking there is no stress to compare.
@@ -102,7 +101,7 @@ pub fn fit(model: &'static ModelDescriptor, table: &TestData) -> Result<Fit, Err
     fit_until(model, table, &|| false)
 }
 
-/// As [`fit`], which ends where `stop` says so.
+/// Fits as [`fit`] does, until `stop` returns true.
 ///
 /// # Errors
 /// As [`fit`]; [`Error::Stopped`].

@@ -6,14 +6,14 @@ use super::data::{TestData, TestState};
 use super::descriptor::UNLIMITED;
 use super::{Domain, Error, Hyperelastic, ModelDescriptor, homogeneous};
 
-/// What data say of a fitted parameter.
+/// Verdict of the data on a fitted parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Identifiability {
-    /// They determine it.
+    /// Determined by the data.
     Determined,
     /// A modulus without any effect on the stresses, or the exponent of such a term: the term is absent.
     Absent,
-    /// It may have any value as large, as a locking limit far beyond the data.
+    /// Not bounded from above by the data, e.g. a locking limit far beyond them.
     Undetermined,
 }
 
@@ -34,11 +34,11 @@ pub fn residuals<L: Hyperelastic + ?Sized>(law: &L, table: &TestData) -> Result<
 /// The differences carry 1e-10, and an effect below 1e-6 of the stresses tells nothing.
 const EFFECT: f64 = 1e-6;
 
-/// What the data say at a minimum.
+/// Uncertainty of the parameters at a minimum.
 pub(super) struct Uncertainty {
     /// Standard errors.
     pub errors: Vec<Option<f64>>,
-    /// Whether parameters are determined.
+    /// Verdict on each parameter.
     pub identifiability: Vec<Identifiability>,
     /// Draws of all parameters.
     pub draws: Vec<Vec<f64>>,
@@ -162,8 +162,7 @@ impl<'a> Map<'a> {
         Some(DMatrix::from_columns(&columns))
     }
 
-    /// What the data say of the parameters. Without standard errors are those that the residuals do not depend on, and all if the
-    /// rest are collinear.
+    /// Computes the uncertainty of the parameters. Those without effect on the residuals have no standard error; none has if the others are collinear.
     pub fn uncertainty(&self, q: &DVector<f64>, table: &TestData) -> Uncertainty {
         let mut found = Uncertainty {
             errors: vec![None; q.len()],

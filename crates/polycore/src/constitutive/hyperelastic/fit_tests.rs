@@ -77,7 +77,7 @@ fn every_law_finds_back_its_own_parameters() {
     }
 }
 
-/// One parameter, linear: μ and its standard error in closed form, s/√Σg².
+/// Tests a law that is linear in one parameter: μ and its standard error in closed form, s/√Σg².
 #[test]
 fn standard_error_of_the_linear_law() {
     let table = treloar();

@@ -68,7 +68,7 @@ pub fn incompressible(stretch_1: f64, stretch_2: f64) -> Result<[f64; 3], Error>
 pub struct PlaneStress {
     /// F with its thickness stretch.
     pub deformation: DeformationGradient,
-    /// In-plane PK2 [S₁₁, S₂₂, S₁₂], Pa.
+    /// PK2 stress in the plane, [S₁₁, S₂₂, S₁₂], Pa.
     pub stress: Vector3<f64>,
     /// ∂[S₁₁, S₂₂, S₁₂]/∂[E₁₁, E₂₂, 2E₁₂] at S₃₃ = 0 (ℂ₃₃₃₃ condensed out), Pa.
     pub tangent: Matrix3<f64>,

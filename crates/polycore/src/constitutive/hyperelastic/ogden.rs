@@ -12,7 +12,7 @@ pub struct Ogden {
     terms: Vec<(f64, f64)>,
 }
 
-/// How μᵢ enters the prefactor cᵢ.
+/// Convention for μᵢ in the prefactor cᵢ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum OgdenConvention {
     /// cᵢ = 2μᵢ/αᵢ, as (1.24) prints it: the shear modulus is Σμᵢαᵢ.

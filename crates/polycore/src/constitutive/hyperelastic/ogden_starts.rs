@@ -1,5 +1,4 @@
-//! Where fits of Ogden's law start. The sum of squares has many minima in the exponents, but for given exponents the
-//! stress is linear in the moduli: all subsets of a grid of exponents are solved exactly, and the best become starts.
+//! Starting points for fits of Ogden's law. The sum of squares has many minima in the exponents, but for given exponents the stress is linear in the moduli: all subsets of a grid of exponents are solved exactly, and the best become starting points.
 
 use nalgebra::{DMatrix, DVector};
 

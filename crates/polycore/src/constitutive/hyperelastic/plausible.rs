@@ -1,4 +1,4 @@
-//! Whether measured states can be what a table calls them: signs, strains under other names, the tail of a broken specimen.
+//! Plausibility checks of test data: signs, mislabelled strains, the tail of a broken specimen.
 
 use super::columns::StrainMeasure;
 use super::data::Mode;
@@ -8,7 +8,7 @@ use super::data::Mode;
 pub(super) struct Row {
     pub index: usize,
     pub mode: Mode,
-    /// Of a test that is called compression.
+    /// True for a test labelled as compression.
     pub compression: bool,
     /// Strains as they are written, without their unit.
     pub written: [f64; 2],
@@ -81,7 +81,7 @@ pub(super) fn plausible(
     Ok(())
 }
 
-/// Whether strains are stretches by all signs: around 1 the stress is about 0, and none is near 0.
+/// Returns true if the strains look like stretches: around 1 the stress is about 0, and none is near 0.
 fn called_strain(rows: &[Row], largest: f64) -> bool {
     let at_rest = |row: &Row| (row.written[0] - 1.0).abs() < 0.02 && row.nominal[0].abs() <= NOISE * largest;
     rows.iter().any(at_rest)

@@ -1,4 +1,4 @@
-//! Whether a law stiffens against every further strain (Drucker), where tests have been and beyond.
+//! Drucker stability of a law, within the range of the tests and beyond.
 
 use super::data::{Mode, TestData};
 use super::{Hyperelastic, homogeneous};
@@ -14,9 +14,7 @@ pub fn range(table: &TestData) -> [f64; 2] {
     stretches.fold([1.0, 1.0], |[low, high], l| [l.min(low), l.max(high)])
 }
 
-/// The stretch, going from rest to `to`, from which an incompressible law is unstable in a test: where
-/// ∂τᵢ/∂ln λⱼ, τᵢ = λᵢPᵢ at a free third face, is not positive definite (Drucker's postulate dτ : dε > 0 for all strains in the
-/// plane of the sheet). Nothing where it is stable up to there or up to its locking.
+/// Returns the stretch, between rest and `to`, from which an incompressible law is unstable in a test: there ∂τᵢ/∂ln λⱼ, τᵢ = λᵢPᵢ at a free third face, is not positive definite (Drucker's postulate dτ : dε > 0 for all strains in the plane of the sheet). `None` if it is stable up to `to` or up to its locking stretch.
 pub fn unstable_from<L: Hyperelastic + ?Sized>(law: &L, mode: Mode, to: f64) -> Option<f64> {
     let stress = |logs: [f64; 2]| {
         let [a, b] = logs.map(f64::exp);

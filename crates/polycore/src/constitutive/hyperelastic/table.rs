@@ -10,7 +10,7 @@ use crate::table::{self, plain_unit, plainly};
 use crate::units::Unit;
 use crate::units::dimension::{RatioDimension, StressDimension};
 
-/// What the headings of a table leave open.
+/// Properties of a table that its headings do not state.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TestFormat {
     /// The test of all rows, where no column names it.
@@ -30,11 +30,11 @@ pub struct TestFormat {
 /// A table that was read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImportedTest {
-    /// Its states.
+    /// States of the test.
     pub table: TestData,
-    /// One line: how the file was understood.
+    /// Description of the file's layout, one line.
     pub description: String,
-    /// What was left out or turned round, a line each.
+    /// Rows left out and signs changed, one line each.
     pub notes: Vec<String>,
 }
 
@@ -67,7 +67,7 @@ impl TestData {
         Ok(Self::parse_as(&path.display().to_string(), bytes, meaning)?)
     }
 
-    /// As [`TestData::read_as`], of what a file holds.
+    /// Parses the bytes of a file as [`TestData::read_as`] does.
     ///
     /// # Errors
     /// [`Error::Data`] with line and column: headings, units and modes that are not known or leave several possibilities,
@@ -80,7 +80,7 @@ impl TestData {
     }
 }
 
-/// With the line in the reason.
+/// Converts an error, with the line in its reason.
 fn located(error: table::Error) -> Error {
     let table::Error { path, line, what, found, allowed } = error;
     let line = if line == 0 { String::new() } else { format!("line {line}: ") };

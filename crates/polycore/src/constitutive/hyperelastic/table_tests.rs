@@ -8,7 +8,7 @@ fn plain(text: &str) -> ImportedTest {
     read(text, &TestFormat::default()).unwrap_or_else(|error| panic!("{text}\n{error}"))
 }
 
-/// What the programs have written and read since there are tables.
+/// Reads the layouts that the programs have always written.
 #[test]
 fn both_layouts_and_any_unit_of_stress() {
     let uniaxial = TestData::parse("t", "# source: me, 2024\nstretch,nominal_kPa\n1,0\n4, 1500\n").unwrap();
@@ -119,7 +119,7 @@ fn tests_and_compression() {
     assert_eq!((states[0].nominal, states[1].nominal), ([0.5e6, 0.0], [0.5e6, 0.5e6]));
 }
 
-/// What one heading leaves open, a key settles.
+/// Keys resolve what one heading leaves ambiguous.
 #[test]
 fn keys_settle_what_headings_leave_open() {
     let text = "Strain A,Strain B,Stress\n0.25,0.5,0.5\n0.5,1,0.75\n";

@@ -1,4 +1,4 @@
-//! One check for every law of [`all`], and closed forms for each.
+//! Checks common to all laws of [`all`], and closed forms for each.
 
 use super::*;
 use crate::constitutive::verify::deformations;
@@ -92,7 +92,7 @@ fn small_strain_limit_of_the_incompressible_laws() {
     }
 }
 
-/// At F = 1 the tangent is λ* 1⊗1 + 2μ𝕀 and, in the stress-free forms, S = 0; λ* is λ only for laws linear in I₁.
+/// Tests F = 1: the tangent is λ* 1⊗1 + 2μ𝕀 and, in the stress-free forms, S = 0; λ* is λ only for laws linear in I₁.
 #[test]
 fn small_strain_limit_of_the_compressible_laws() {
     let lame = 1.7e6;

@@ -1,9 +1,9 @@
-//! What neurons do with their sums.
+//! Activation functions and their derivatives.
 
 use super::real::Real;
 use serde::{Deserialize, Serialize};
 
-/// What a neuron does with its sum; (3.11) and more.
+/// Activation function of a neuron; (3.11) and more.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]

@@ -1,4 +1,4 @@
-//! One evaluation of a network: forwards with slopes, backwards for gradients.
+//! Evaluation of a network: forward with slopes, backward for gradients.
 
 use super::packed::{MOST_COLUMNS, padded};
 use super::real::Real;
@@ -26,7 +26,7 @@ pub struct Tape<T> {
     delta: Vec<T>,
 }
 
-/// What a layer did: columns, each padded to whole panels.
+/// Results of a layer: columns, each padded to whole panels.
 #[derive(Debug, Clone, Default)]
 struct Record<T> {
     outputs: usize,
@@ -37,7 +37,7 @@ struct Record<T> {
     second: Vec<T>,
 }
 
-/// What is wanted of a pass.
+/// Derivatives that a pass computes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Want {
     /// Outputs at 1 or more points; with gradients of the first output, or without.
@@ -216,8 +216,7 @@ fn activate<T: Real, const FUSED: bool>(
     }
 }
 
-/// With the sums a of each layer and the adjoints g = ∂out/∂y of its activations y = σ(a): the gradient by reverse mode,
-/// H = Σ g σ″(a) (∂a/∂x)(∂a/∂x)ᵀ over all neurons.
+/// Computes the gradient by reverse mode, from the sums a of each layer and the adjoints g = ∂out/∂y of its activations y = σ(a), and H = Σ g σ″(a) (∂a/∂x)(∂a/∂x)ᵀ over all neurons.
 #[inline(always)]
 fn backward<T: Real, S: Simd>(
     simd: S,

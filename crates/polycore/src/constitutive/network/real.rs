@@ -4,7 +4,7 @@ use pulp::Simd;
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
-/// What the kernels ask of a precision: vectors of the machine's widest instructions.
+/// Floating-point type with vectors of the machine's widest instructions.
 pub trait Lanes: Copy {
     /// A vector.
     type Vector<S: Simd>: Copy;
@@ -50,7 +50,7 @@ pub trait Real:
     const ONE: Self;
     /// Rounded from f64.
     fn from_f64(value: f64) -> Self;
-    /// To f64, exact.
+    /// Converts to f64, exactly.
     fn to_f64(self) -> f64;
     /// a·b + c, in one rounding where the machine has an instruction for it.
     fn fused<const FUSED: bool>(self, b: Self, c: Self) -> Self;

@@ -1,4 +1,4 @@
-//! From C to a prediction: members, their mean, lists of points.
+//! Predictions at C: members, their mean, lists of points.
 
 use super::{Kind, Memory, Prediction, RestTerm, Surrogate, Workspace, back, product};
 use crate::constitutive::Error;
@@ -8,12 +8,12 @@ use crate::tensor::Voigt;
 use crate::tensor::voigt::{self, NAMES};
 use nalgebra::{SMatrix, SVector};
 
-/// What the networks are given at a C.
+/// Inputs of the networks at a C.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Features {
     /// Standardised inputs (3.8); the first of them count.
     pub values: [f64; LANES],
-    /// Of an energy: derivatives of its invariants, not yet standardised, by the six components of C, C₁₂ counted once.
+    /// Derivatives of the invariants of an energy, not yet standardised, with respect to the six components of C, C₁₂ counted once.
     pub slopes: [[f64; 6]; LANES],
 }
 
@@ -192,7 +192,7 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         })
     }
 
-    /// One member at c, without its correction at the identity.
+    /// Evaluates one member at c, without its correction at the identity.
     pub(super) fn member(
         &self,
         m: usize,

@@ -1,4 +1,4 @@
-//! What a law is, without its weights.
+//! Metadata of a learnt law.
 
 use super::invariants::Invariants;
 use super::{Softening, Support, Symmetry};
@@ -13,7 +13,7 @@ const AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 /// Convex functions that never fall.
 const CONVEX: [Activation; 4] = [Activation::Linear, Activation::Relu, Activation::Softplus, Activation::Elu];
 
-/// What the networks of a law compute.
+/// Function that the networks compute.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase", deny_unknown_fields)]
 pub enum Kind {
@@ -21,15 +21,14 @@ pub enum Kind {
     Ann,
     /// Invariants of C → W.
     Energy {
-        /// What W is invariant under.
+        /// Symmetry of W.
         symmetry: Symmetry,
         /// Material axes as rows, orthonormal and right-handed.
         axes: [[f64; 3]; 3],
-        /// Whether W is polyconvex by construction: see [`Kind::non_negative`].
+        /// True if W is polyconvex by construction: see [`Kind::non_negative`].
         #[serde(default)]
         polyconvex: bool,
-        /// Whether ‖F‖ = √I₁ and ‖cof F‖ = √I₂ are its inputs instead of their squares, of a polyconvex isotropic one:
-        /// convex in F and cof F too, and grows as slowly as with the first power of a stretch.
+        /// True if ‖F‖ = √I₁ and ‖cof F‖ = √I₂ replace their squares as inputs of a polyconvex isotropic energy: it is convex in F and cof F too, and may grow as slowly as the first power of a stretch.
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         norms: bool,
     },
@@ -52,16 +51,14 @@ impl Kind {
         Self::Energy { symmetry: Symmetry::Isotropic, axes: AXES, polyconvex: true, norms: true }
     }
 
-    /// Whether this is a polyconvex energy.
+    /// Returns true for a polyconvex energy.
     pub fn is_polyconvex(&self) -> bool {
         matches!(self, Self::Energy { polyconvex: true, .. })
     }
 
-    /// Whether a weight of `layer` (0 is the one after the inputs) for its input `input` must not be negative, so that a
-    /// polyconvex energy is convex and grows in all its inputs but J, the last one, which may come with any sign.
+    /// Returns true if the weight of `layer` (0 follows the inputs) for its input `input` must not be negative, so that a polyconvex energy is convex and increasing in all its inputs but J, the last one, whose weight may have any sign.
     ///
-    /// With convex growing activations (`softplus`, `relu`, `elu`, `linear`) a network of such weights is an
-    /// input-convex one (Amos et al. 2017, <https://arxiv.org/abs/1609.07152>).
+    /// With convex increasing activations (`softplus`, `relu`, `elu`, `linear`) a network of such weights is input-convex (Amos et al. 2017, <https://arxiv.org/abs/1609.07152>).
     pub fn non_negative(&self, layer: usize, input: usize) -> bool {
         self.is_polyconvex() && (layer > 0 || input + 1 < self.inputs())
     }
@@ -90,13 +87,13 @@ impl Kind {
     }
 }
 
-/// Everything about a law but its weights.
+/// Metadata of a law: everything but its weights.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Header {
-    /// What the networks compute.
+    /// Function of the networks.
     pub kind: Kind,
-    /// Their widths and activations.
+    /// Widths and activations of the networks.
     pub architecture: Architecture,
     /// Networks in the ensemble.
     pub members: usize,
@@ -106,7 +103,7 @@ pub struct Header {
     pub input_deviation: Vec<f64>,
     /// Added to the outputs after scaling, Pa; of an energy it has no effect.
     pub output_mean: Vec<f64>,
-    /// One unit of each output, Pa (J/m³).
+    /// Unit of each output, Pa (J/m³).
     pub output_deviation: Vec<f64>,
     /// Least and greatest C of each component in the training data; equal where a component was never seen to change.
     pub training_box: [[f64; 2]; 6],
@@ -115,10 +112,10 @@ pub struct Header {
     pub support: Option<Support>,
     /// Spread of the ensemble, Pa, beyond which a prediction is flagged ([`super::Surrogate::with_spread_limit`]).
     pub spread_limit: Option<f64>,
-    /// How the stress of an energy falls on unloading.
+    /// Softening of an energy on unloading.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub softening: Option<Softening>,
-    /// Where data and weights come from.
+    /// Sources of data and weights.
     #[serde(default)]
     pub provenance: Vec<String>,
 }

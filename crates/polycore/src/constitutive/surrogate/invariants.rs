@@ -9,13 +9,12 @@ use crate::constitutive::network::Real;
 pub struct Invariants {
     list: &'static [&'static [Monomial<'static>]],
     names: &'static [&'static str],
-    /// From this one on they are the roots of their polynomials: J = √det C is the last of the polyconvex ones.
+    /// Index of the first invariant that is the root of its polynomial: J = √det C is the last of the polyconvex ones.
     first_root: usize,
 }
 
 impl Invariants {
-    /// Those of a symmetry; the polyconvex ones of those that have none are empty. `norms`: the roots of I₁ and I₂ in
-    /// their place, of a polyconvex isotropic energy.
+    /// Creates the invariants of a symmetry, or its polyconvex ones (empty if it has none). With `norms` the roots of I₁ and I₂ replace them in a polyconvex isotropic energy.
     pub fn new(symmetry: Symmetry, polyconvex: bool, norms: bool) -> Self {
         let (list, names) = match polyconvex {
             true => (symmetry.polyconvex_invariants().unwrap_or_default(), symmetry.names(true)),
@@ -28,12 +27,12 @@ impl Invariants {
         }
     }
 
-    /// How many.
+    /// Number of invariants.
     pub fn count(self) -> usize {
         self.list.len()
     }
 
-    /// What invariant k is called.
+    /// Name of invariant k.
     pub fn name(self, k: usize) -> &'static str {
         self.names[k]
     }

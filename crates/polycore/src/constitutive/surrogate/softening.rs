@@ -24,7 +24,7 @@ pub struct Softening {
     pub greatest: f64,
 }
 
-/// What a point has seen.
+/// Loading history of a point.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct SofteningHistory {
     /// m: the greatest W, J/m³; 0 at first.

@@ -1,4 +1,4 @@
-//! Where the training data lie: representatives of their strains, and how far a C is from them.
+//! Coverage of the training data: representatives of their strains, and the distance of a C from them.
 //!
 //! A box says nothing about the gaps in it: paths are lines through six dimensions. Representatives are training rows
 //! chosen one after the other, each the row farthest from those before it (Gonzalez 1985,
@@ -21,7 +21,7 @@ const BLOCK: usize = 16;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Support {
-    /// Their C.
+    /// C of each representative.
     pub points: Vec<[f64; 6]>,
     /// Inverse standard deviation of each component of C in the training data; 0 where it never changed.
     pub weights: [f64; 6],
@@ -31,7 +31,7 @@ pub struct Support {
 }
 
 impl Support {
-    /// Of the strains of training rows, with up to `most` representatives.
+    /// Selects up to `most` representatives from the strains of training rows.
     ///
     /// # Errors
     /// [`Error::Invalid`] for no rows, rows that are not finite, or `most` outside of 1 to 4096.

@@ -1,4 +1,4 @@
-//! What an energy may depend on under a material symmetry: polynomials in the six components of C.
+//! Invariants of each material symmetry, as polynomials in the six components of C.
 //!
 //! Invariants are written as sums of monomials in [C₁₁, C₂₂, C₃₃, C₁₂, C₁₃, C₂₃] in the material's own axes, whose
 //! derivatives are then exact by rule. Bases: Boehler 1987 (<https://doi.org/10.1007/978-3-7091-2810-7>),
@@ -129,7 +129,7 @@ impl Symmetry {
         }
     }
 
-    /// How a polyconvex energy takes away its stress at rest, which has the form p 1 + Σ s a⊗a in the material axes.
+    /// Terms with which a polyconvex energy removes its stress at rest, of the form p 1 + Σ s a⊗a in the material axes.
     pub fn stress_at_rest(self) -> StressAtRest {
         match self {
             Self::Orthotropic => StressAtRest {
@@ -149,7 +149,7 @@ impl Symmetry {
 pub struct StressAtRest {
     /// p.
     pub spherical: [f64; 3],
-    /// Of each direction a: s, and the places of a·Ca and a·cof C a among the polyconvex invariants.
+    /// Factor s for each direction a, and the indices of a·Ca and a·cof C a among the polyconvex invariants.
     pub along: &'static [([f64; 3], usize, usize)],
 }
 

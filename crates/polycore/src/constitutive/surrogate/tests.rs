@@ -1,4 +1,4 @@
-//! What holds for every kind of model by construction, beside [`crate::constitutive::verify`].
+//! Properties that every model has by construction, beside [`crate::constitutive::verify`].
 
 use super::*;
 use crate::constitutive::network::Activation::{Elu, Linear, Relu, Softplus, Tanh};

@@ -1,4 +1,4 @@
-//! How many bad predictions the flags catch, and how many good ones they spoil, on a law that is known.
+//! Quality of the flags on a known law: share of bad predictions caught, and of good ones flagged.
 //!
 //! The networks are fitted without a training framework: hidden weights stay random, the linear outputs are those of ridge
 //! regression (Huang et al. 2006, <https://doi.org/10.1016/j.neucom.2005.12.126>).
