@@ -61,11 +61,11 @@ pub fn langevin_methods() -> Vec<(&'static str, &'static str, Option<&'static st
 }
 
 /// Name, unit and example value.
-type Parameter = (&'static str, &'static str, f64);
+type ParameterRow = (&'static str, &'static str, f64);
 
 /// Name of each law, and name, unit and example value of each of its parameters.
 #[pyfunction]
-pub fn models() -> Vec<(&'static str, Vec<Parameter>)> {
+pub fn models() -> Vec<(&'static str, Vec<ParameterRow>)> {
     let parameters = |model: &hyperelastic::ModelDescriptor| {
         model.parameters.iter().zip(model.example).map(|(p, &example)| (p.name, p.unit, example)).collect()
     };

@@ -3,7 +3,7 @@
 use crate::bond::BondLaw;
 use crate::error::{fault, value};
 use crate::pool;
-use crate::watch::{Line, Watchers, watched};
+use crate::watch::{RunLink, Watchers, watched};
 use harness::case::{Fault, Step, StepField};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray1};
 use peri::Error;
@@ -23,12 +23,12 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
 /// A function of all positions, (N, D); displacement and body force of the points that it takes.
-type Load = (Py<PyAny>, Vec<Option<f64>>, Vec<f64>);
+type PrescribedRegion = (Py<PyAny>, Vec<Option<f64>>, Vec<f64>);
 
 /// A model as Python describes it; lengths in m.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-pub struct Spec {
+pub struct ModelSpec {
     /// `add` or `cut`, the kind, its numbers.
     shapes: Vec<(String, String, Vec<f64>)>,
     /// Two ends in a plane; in space a corner and two edges.
@@ -46,14 +46,14 @@ pub struct Spec {
     critical_stretch: Option<f64>,
     fracture_energy: Option<f64>,
     convention: String,
-    regions: Vec<Load>,
+    regions: Vec<PrescribedRegion>,
     steps: usize,
     contact: Option<f64>,
 }
 
 /// Method and settings.
 #[derive(Clone, Copy)]
-enum Solver {
+enum SolverChoice {
     Lbfgs(Lbfgs),
     Relaxation(DynamicRelaxation),
     Verlet(VelocityVerlet),
@@ -62,7 +62,7 @@ enum Solver {
 /// A body in the plane or in space.
 trait AnyBody: Send + Sync {
     fn dimension(&self) -> usize;
-    fn solve(&mut self, method: Solver, line: &Line<'_>) -> Result<(), Error>;
+    fn solve(&mut self, method: SolverChoice, line: &RunLink<'_>) -> Result<(), Error>;
     fn positions(&self) -> Vec<f64>;
     fn displacements(&self) -> Vec<f64>;
     fn set_velocity(&mut self, velocity: &[f64]);
@@ -73,18 +73,18 @@ trait AnyBody: Send + Sync {
     fn extend(&mut self, factors: Vec<f64>);
 }
 
-type Built<const D: usize> = model::Simulation<D, BondMaterial<'static>>;
+type BondSimulation<const D: usize> = model::Simulation<D, BondMaterial<'static>>;
 
 fn stopped() -> Error {
     Error::Shared(polycore::Error::Interrupted { program: "peri", output: Default::default() })
 }
 
-impl<const D: usize> AnyBody for Built<D> {
+impl<const D: usize> AnyBody for BondSimulation<D> {
     fn dimension(&self) -> usize {
         D
     }
 
-    fn solve(&mut self, method: Solver, line: &Line<'_>) -> Result<(), Error> {
+    fn solve(&mut self, method: SolverChoice, line: &RunLink<'_>) -> Result<(), Error> {
         let sites: Vec<usize> = self.bonds.particles().iter().map(|&site| site as usize).collect();
         let positions = line.wants_steps().then(|| self.positions());
         let watch = |_: &Status| if line.stop().load(Ordering::Relaxed) { Err(stopped()) } else { Ok(()) };
@@ -102,18 +102,18 @@ impl<const D: usize> AnyBody for Built<D> {
             if line.step(step) { Ok(()) } else { Err(stopped()) }
         };
         match method {
-            Solver::Lbfgs(method) => self.solve_watched(method, watch, finished),
-            Solver::Relaxation(method) => self.solve_watched(method, watch, finished),
-            Solver::Verlet(method) => self.solve_watched(method, watch, finished),
+            SolverChoice::Lbfgs(method) => self.solve_watched(method, watch, finished),
+            SolverChoice::Relaxation(method) => self.solve_watched(method, watch, finished),
+            SolverChoice::Verlet(method) => self.solve_watched(method, watch, finished),
         }
     }
 
     fn positions(&self) -> Vec<f64> {
-        Built::displacements(self).flat_map(|(position, _)| position).collect()
+        BondSimulation::displacements(self).flat_map(|(position, _)| position).collect()
     }
 
     fn displacements(&self) -> Vec<f64> {
-        Built::displacements(self).flat_map(|(_, displacement)| displacement).collect()
+        BondSimulation::displacements(self).flat_map(|(_, displacement)| displacement).collect()
     }
 
     fn set_velocity(&mut self, velocity: &[f64]) {
@@ -124,7 +124,7 @@ impl<const D: usize> AnyBody for Built<D> {
     }
 
     fn history(&self) -> Vec<(&'static str, &'static str, Vec<f64>)> {
-        let rows = Built::history(self);
+        let rows = BondSimulation::history(self);
         Record::SCALARS.map(|(name, unit, get)| (name, unit, rows.iter().map(get).collect())).to_vec()
     }
 
@@ -147,7 +147,7 @@ impl<const D: usize> AnyBody for Built<D> {
     }
 
     fn fragments(&self) -> usize {
-        Built::fragments(self)
+        BondSimulation::fragments(self)
     }
 
     fn extend(&mut self, factors: Vec<f64>) {
@@ -165,7 +165,7 @@ pub struct Simulation {
 #[pymethods]
 impl Simulation {
     #[new]
-    fn new(py: Python<'_>, spec: Spec) -> PyResult<Self> {
+    fn new(py: Python<'_>, spec: ModelSpec) -> PyResult<Self> {
         let sampled = match spec.law.bind(py).cast::<BondLaw>() {
             Ok(law) => Some(law.get().law.clone()),
             Err(_) => None,
@@ -294,13 +294,13 @@ fn shape<const D: usize>(kind: &str, numbers: &[f64]) -> PyResult<Shape<D>> {
 }
 
 fn build<const D: usize>(
-    spec: Spec,
+    spec: ModelSpec,
     sampled: Option<Arc<crate::bond::Sampled>>,
     named: Option<String>,
     raised: &Arc<Mutex<Option<PyErr>>>,
 ) -> PyResult<Box<dyn AnyBody>>
 where
-    Body<D>: Placed,
+    Body<D>: InSpace,
 {
     let mut shapes = spec.shapes.iter();
     let Some((_, kind, numbers)) = shapes.next() else { return Err(value("a body needs a shape")) };
@@ -315,7 +315,7 @@ where
     if spec.partial_volumes {
         body = body.volume_correction(VolumeCorrection::Linear);
     }
-    let body = body.placed(&spec.space, spec.thickness)?;
+    let body = body.in_space(&spec.space, spec.thickness)?;
     let calibration = if spec.lattice_calibration { Calibration::Lattice } else { Calibration::Continuum };
     let rubber = match (sampled, named) {
         (Some(law), _) => Rubber::of_law(law, spec.youngs_modulus),
@@ -394,12 +394,12 @@ fn cut<const D: usize>(numbers: &[f64]) -> PyResult<Cut<D>> {
 }
 
 /// The space of a body.
-trait Placed: Sized {
-    fn placed(self, space: &str, thickness: f64) -> PyResult<Self>;
+trait InSpace: Sized {
+    fn in_space(self, space: &str, thickness: f64) -> PyResult<Self>;
 }
 
-impl Placed for Body<2> {
-    fn placed(self, space: &str, thickness: f64) -> PyResult<Self> {
+impl InSpace for Body<2> {
+    fn in_space(self, space: &str, thickness: f64) -> PyResult<Self> {
         match space {
             "plane-stress" => Ok(self.plane_stress(thickness)),
             "plane-strain" => Ok(self.plane_strain(thickness)),
@@ -408,19 +408,19 @@ impl Placed for Body<2> {
     }
 }
 
-impl Placed for Body<3> {
-    fn placed(self, _: &str, _: f64) -> PyResult<Self> {
+impl InSpace for Body<3> {
+    fn in_space(self, _: &str, _: f64) -> PyResult<Self> {
         Ok(self)
     }
 }
 
 /// A method by its name, with some of its settings.
-fn solver(name: &str, mut settings: HashMap<String, f64>) -> PyResult<Solver> {
+fn solver(name: &str, mut settings: HashMap<String, f64>) -> PyResult<SolverChoice> {
     let mut take = |name: &str, default: f64| settings.remove(name).unwrap_or(default);
     let method = match name {
         "lbfgs" => {
             let own = Lbfgs::default();
-            Solver::Lbfgs(Lbfgs {
+            SolverChoice::Lbfgs(Lbfgs {
                 tolerance: take("tolerance", 1e-4),
                 max_iterations: take("max_iterations", own.max_iterations as f64) as u64,
                 accept: take("accept", own.accept),
@@ -429,7 +429,7 @@ fn solver(name: &str, mut settings: HashMap<String, f64>) -> PyResult<Solver> {
         }
         "relaxation" => {
             let own = DynamicRelaxation::default();
-            Solver::Relaxation(DynamicRelaxation {
+            SolverChoice::Relaxation(DynamicRelaxation {
                 tolerance: take("tolerance", own.tolerance),
                 max_iterations: take("max_iterations", own.max_iterations as f64) as u64,
                 accept: take("accept", own.accept),
@@ -438,7 +438,7 @@ fn solver(name: &str, mut settings: HashMap<String, f64>) -> PyResult<Solver> {
         }
         "verlet" => {
             let step = take("time_step", 0.0);
-            Solver::Verlet(VelocityVerlet {
+            SolverChoice::Verlet(VelocityVerlet {
                 density: take("density", 1000.0),
                 time_step: (step > 0.0).then_some(step),
                 safety: take("safety", 0.8),

@@ -15,7 +15,7 @@ use pyo3::types::PyDict;
 /// A polymer as Python describes it, SI.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-pub struct Spec {
+pub struct PointSpec {
     density: f64,
     /// Temperatures, K, none of a constant, and values.
     conductivity: (Vec<f64>, Vec<f64>),
@@ -29,7 +29,7 @@ pub struct Spec {
     seed: f64,
 }
 
-impl Spec {
+impl PointSpec {
     fn polymer(self) -> Result<Semicrystalline, crystfem::Error> {
         let property = |name: &'static str, (temperatures, values): (Vec<f64>, Vec<f64>)| match values[..] {
             [value] if temperatures.is_empty() => Property::constant(name, value),
@@ -63,7 +63,7 @@ impl Spec {
 #[pyfunction]
 pub fn course<'py>(
     py: Python<'py>,
-    material: Spec,
+    material: PointSpec,
     time: Vec<f64>,
     temperature: Vec<f64>,
     degree: f64,

@@ -21,7 +21,7 @@ const LOWER: [usize; 6] = [0, 4, 8, 3, 6, 7];
 
 /// Options of a prediction at rows of `width` numbers.
 #[derive(Clone, Copy)]
-struct How {
+struct PredictOptions {
     width: usize,
     tangent: bool,
     uncertainty: bool,
@@ -31,7 +31,7 @@ struct How {
 
 /// Predictions at N points.
 #[derive(Default)]
-struct Found {
+struct Predicted {
     stress: Vec<f64>,
     tangent: Vec<f64>,
     energy: Vec<f64>,
@@ -43,15 +43,15 @@ struct Found {
 }
 
 /// Share of the output that a thread fills.
-struct Part<'a> {
+struct OutputChunk<'a> {
     c: &'a [f64],
     stress: &'a mut [f64],
     tangent: Option<&'a mut [f64]>,
     energy: &'a mut [f64],
-    uncertainty: Option<Uncertainty<'a>>,
+    uncertainty: Option<UncertaintyChunk<'a>>,
 }
 
-struct Uncertainty<'a> {
+struct UncertaintyChunk<'a> {
     spread: &'a mut [f64],
     deviation: &'a mut [f64],
     flags: &'a mut [bool],
@@ -76,7 +76,7 @@ pub fn predict<'py>(
     let rows =
         c.as_slice().map_err(|_| PyValueError::new_err("C: found strides; allowed: contiguous rows"))?;
     let (count, width) = shape;
-    let how = How { width, tangent, uncertainty, rounding };
+    let how = PredictOptions { width, tangent, uncertainty, rounding };
     let found = match count <= CHUNK {
         true => py.detach(|| evaluate(law, rows, how, &AtomicBool::new(false))),
         false => stoppable(py, |stop| evaluate(law, rows, how, stop))?,
@@ -100,11 +100,12 @@ pub fn predict<'py>(
 fn evaluate(
     law: &dyn Law,
     rows: &[f64],
-    How { width, tangent, uncertainty, rounding }: How,
+    PredictOptions { width, tangent, uncertainty, rounding }: PredictOptions,
     stop: &AtomicBool,
-) -> Result<Found, String> {
+) -> Result<Predicted, String> {
     let count = rows.len() / width;
-    let mut found = Found { stress: vec![0.0; 6 * count], energy: vec![0.0; count], ..Found::default() };
+    let mut found =
+        Predicted { stress: vec![0.0; 6 * count], energy: vec![0.0; count], ..Predicted::default() };
     if tangent {
         found.tangent = vec![0.0; 36 * count];
     }
@@ -114,7 +115,7 @@ fn evaluate(
         found.flags = vec![false; 8 * count];
         found.unseen = vec![false; 6 * count];
     }
-    let mut parts: Vec<Part<'_>> = Vec::with_capacity(count.div_ceil(CHUNK));
+    let mut parts: Vec<OutputChunk<'_>> = Vec::with_capacity(count.div_ceil(CHUNK));
     let mut tangents = found.tangent.chunks_mut(36 * CHUNK);
     let mut spreads = found.spread.chunks_mut(CHUNK);
     let mut deviations = found.deviation.chunks_mut(6 * CHUNK);
@@ -124,14 +125,14 @@ fn evaluate(
     for ((c, stress), energy) in whole.zip(found.energy.chunks_mut(CHUNK)) {
         let uncertainty = match (spreads.next(), deviations.next(), flags.next(), unseen.next()) {
             (Some(spread), Some(deviation), Some(flags), Some(unseen)) => {
-                Some(Uncertainty { spread, deviation, flags, unseen })
+                Some(UncertaintyChunk { spread, deviation, flags, unseen })
             }
             _ => None,
         };
-        parts.push(Part { c, stress, tangent: tangents.next(), energy, uncertainty });
+        parts.push(OutputChunk { c, stress, tangent: tangents.next(), energy, uncertainty });
     }
     let fill = |memory: &mut (Workspace, Vec<Voigt>, Vec<Prediction>),
-                (number, part): (usize, &mut Part<'_>)| {
+                (number, part): (usize, &mut OutputChunk<'_>)| {
         if stop.load(Ordering::Relaxed) {
             return Err((number * CHUNK, "stopped".to_owned()));
         }
@@ -152,7 +153,7 @@ fn evaluate(
     }
 }
 
-impl Part<'_> {
+impl OutputChunk<'_> {
     /// Evaluates the points; the first that the law refuses, and why.
     fn fill(
         &mut self,

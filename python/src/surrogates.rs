@@ -9,16 +9,16 @@ use pyo3::types::{PyBytes, PyDict};
 use std::path::PathBuf;
 
 /// A law C → S, or W, as `mdsurrogate` writes it.
-#[pyclass(frozen, module = "polymech._polymech")]
-pub struct Surrogate {
+#[pyclass(frozen, name = "Surrogate", module = "polymech._polymech")]
+pub struct LearntLaw {
     law: surrogate::Surrogate,
 }
 
 /// W and b of each layer.
-type Layers<'py> = Vec<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>)>;
+type MemberWeights<'py> = Vec<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>)>;
 
 #[pymethods]
-impl Surrogate {
+impl LearntLaw {
     /// Reads a model from the bytes of a file.
     #[new]
     fn new(bytes: &[u8]) -> PyResult<Self> {
@@ -57,7 +57,7 @@ impl Surrogate {
     }
 
     /// W and b of each layer of each member.
-    fn weights<'py>(&self, py: Python<'py>) -> PyResult<Vec<Layers<'py>>> {
+    fn weights<'py>(&self, py: Python<'py>) -> PyResult<Vec<MemberWeights<'py>>> {
         let of_layer = |layer: &Layer<f64>| {
             let outputs = layer.bias.len();
             let weights = layer.weights.clone().into_pyarray(py);

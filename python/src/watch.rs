@@ -31,7 +31,7 @@ enum Message {
 }
 
 /// The working thread's end.
-pub struct Line<'a> {
+pub struct RunLink<'a> {
     stop: &'a AtomicBool,
     sender: Sender<Message>,
     wants_progress: bool,
@@ -39,7 +39,7 @@ pub struct Line<'a> {
     shown: Option<Instant>,
 }
 
-impl<'a> Line<'a> {
+impl<'a> RunLink<'a> {
     /// Flag that is true once the user asks to stop.
     pub fn stop(&self) -> &'a AtomicBool {
         self.stop
@@ -59,8 +59,8 @@ impl<'a> Line<'a> {
     }
 
     /// The end of a line that shows steps alone.
-    pub fn steps(&self) -> Line<'a> {
-        Line { sender: self.sender.clone(), wants_progress: false, shown: None, ..*self }
+    pub fn steps(&self) -> RunLink<'a> {
+        RunLink { sender: self.sender.clone(), wants_progress: false, shown: None, ..*self }
     }
 
     /// Shows a step; whether to go on.
@@ -80,7 +80,7 @@ pub fn watched<T: Send>(
     py: Python<'_>,
     watchers: &Watchers,
     threads: Option<usize>,
-    work: impl FnOnce(Line<'_>) -> T + Send,
+    work: impl FnOnce(RunLink<'_>) -> T + Send,
 ) -> PyResult<T> {
     let stop = AtomicBool::new(false);
     let pool = match threads {
@@ -92,7 +92,7 @@ pub fn watched<T: Send>(
     };
     let (sender, receiver) = channel();
     let (wants_progress, wants_steps) = (watchers.progress.is_some(), watchers.on_step.is_some());
-    let line = Line { stop: &stop, sender, wants_progress, wants_steps, shown: None };
+    let line = RunLink { stop: &stop, sender, wants_progress, wants_steps, shown: None };
     let stop = &stop;
     py.detach(move || {
         std::thread::scope(|scope| {

@@ -8,7 +8,7 @@ use std::process::Command;
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
 use serde::Deserialize;
 
-use crate::workspace::Workspace;
+use crate::workspace::Repository;
 
 /// Prefixes of the names of licence files.
 const TERMS: [&str; 5] = ["LICENSE", "LICENCE", "COPYING", "NOTICE", "UNLICENSE"];
@@ -29,7 +29,7 @@ struct Package {
 }
 
 /// A dependency, its terms and their texts.
-struct Part {
+struct LinkedPackage {
     what: String,
     terms: String,
     texts: Vec<String>,
@@ -39,7 +39,7 @@ struct Part {
 ///
 /// # Errors
 /// Cargo fails; a crate without terms.
-pub fn text(workspace: &Workspace, programs: &[String]) -> Result<String> {
+pub fn text(workspace: &Repository, programs: &[String]) -> Result<String> {
     let linked = linked(workspace, programs)?;
     let metadata = cargo(workspace, &["metadata", "--format-version", "1", "--locked"])?;
     let metadata: Metadata = serde_json::from_str(&metadata).into_diagnostic()?;
@@ -49,17 +49,17 @@ pub fn text(workspace: &Workspace, programs: &[String]) -> Result<String> {
     for package in metadata.packages.iter().filter(|package| package.source.is_some()) {
         let what = format!("{} {}", package.name, package.version);
         if linked.contains(&what) {
-            parts.push(part(package, what, &mit, &apache)?);
+            parts.push(read_package(package, what, &mit, &apache)?);
         }
     }
     if parts.len() < linked.len() / 2 {
         return Err(miette!("terms of {} of {} crates were found", parts.len(), linked.len()));
     }
-    Ok(written(&mut parts))
+    Ok(format_list(&mut parts))
 }
 
 /// Name and version of all crates that the programs are linked with on this machine.
-fn linked(workspace: &Workspace, programs: &[String]) -> Result<BTreeSet<String>> {
+fn linked(workspace: &Repository, programs: &[String]) -> Result<BTreeSet<String>> {
     let mut arguments = vec!["tree", "--locked", "--edges", "normal", "--prefix", "none", "--format", "{p}"];
     let packages: Vec<String> = programs.iter().filter_map(|program| workspace.package(program)).collect();
     packages.iter().for_each(|package| arguments.extend(["--package", package]));
@@ -71,7 +71,7 @@ fn linked(workspace: &Workspace, programs: &[String]) -> Result<BTreeSet<String>
     Ok(tree.lines().filter_map(of).collect())
 }
 
-fn cargo(workspace: &Workspace, arguments: &[&str]) -> Result<String> {
+fn cargo(workspace: &Repository, arguments: &[&str]) -> Result<String> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let output = Command::new(cargo)
         .args(arguments)
@@ -85,7 +85,7 @@ fn cargo(workspace: &Workspace, arguments: &[&str]) -> Result<String> {
     String::from_utf8(output.stdout).into_diagnostic()
 }
 
-fn part(package: &Package, what: String, mit: &str, apache: &str) -> Result<Part> {
+fn read_package(package: &Package, what: String, mit: &str, apache: &str) -> Result<LinkedPackage> {
     let folder = Path::new(&package.manifest_path).parent().unwrap_or(Path::new("."));
     let mut texts = Vec::new();
     let entries = fs::read_dir(folder).into_diagnostic().wrap_err_with(|| folder.display().to_string())?;
@@ -115,11 +115,11 @@ fn part(package: &Package, what: String, mit: &str, apache: &str) -> Result<Part
             _ => return Err(miette!("{what} comes without the text of its licence, {terms}")),
         });
     }
-    Ok(Part { what, terms, texts })
+    Ok(LinkedPackage { what, terms, texts })
 }
 
 /// The list of crates, then every licence text once, with the names of the crates that have it.
-fn written(parts: &mut [Part]) -> String {
+fn format_list(parts: &mut [LinkedPackage]) -> String {
     parts.sort_by(|a, b| a.what.cmp(&b.what));
     let mut text = String::from(
         "# Third-party software\n\nThe programs contain these crates. `plotly` contains plotly.js (MIT, Copyright 2012-2025, \
@@ -149,7 +149,7 @@ mod tests {
     /// Every linked crate is listed with its terms; dev-dependencies and those of other systems are not.
     #[test]
     fn every_linked_crate_has_terms() {
-        let workspace = Workspace::new(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(".."));
+        let workspace = Repository::new(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(".."));
         let text = text(&workspace, &workspace.programs()).expect("terms of all crates");
         let (list, _) = text.split_once("\n## ").expect("texts");
         for name in ["nalgebra", "burn", "plotly", "rust-hdf5", "faer"] {

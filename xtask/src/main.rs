@@ -18,7 +18,7 @@ mod tidy;
 mod validate;
 mod workspace;
 
-use workspace::Workspace;
+use workspace::Repository;
 
 /// Tasks of the polymer-mechanics workspace.
 #[derive(Parser)]
@@ -47,7 +47,7 @@ enum Task {
 }
 
 fn main() -> ExitCode {
-    let workspace = Workspace::new(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(".."));
+    let workspace = Repository::new(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(".."));
     let passed = match Cli::parse().task {
         Task::Test { arguments } => test::run(&workspace, &arguments),
         Task::Validate(options) => validate::run(&workspace, &options),

@@ -6,7 +6,7 @@ use harness::report::{Judgement, Report, Value};
 
 /// Outcome of a case.
 #[derive(Default)]
-pub struct Outcome {
+pub struct CaseOutcome {
     /// `ch2/plate-with-hole`.
     pub case: String,
     /// The case file, relative to the root where it lies below it.
@@ -33,7 +33,7 @@ pub struct Outcome {
     pub report: Option<Report>,
 }
 
-impl Outcome {
+impl CaseOutcome {
     /// Creates the outcome of a case that has not run yet.
     pub fn new(case: &str) -> Self {
         Self { case: case.to_owned(), ..Self::default() }
@@ -71,8 +71,8 @@ impl Outcome {
     /// A scalar of the report with its unit, for a reader.
     pub fn scalar(&self, quantity: &str) -> Option<String> {
         match self.report.as_ref()?.values.get(quantity)? {
-            Value::Scalar { value, unit } if unit.is_empty() => Some(shown(*value)),
-            Value::Scalar { value, unit } => Some(format!("{} {unit}", shown(*value))),
+            Value::Scalar { value, unit } if unit.is_empty() => Some(format_number(*value)),
+            Value::Scalar { value, unit } => Some(format!("{} {unit}", format_number(*value))),
             Value::Curve { .. } => None,
         }
     }
@@ -114,7 +114,7 @@ impl Outcome {
 }
 
 /// Four significant digits.
-fn shown(value: f64) -> String {
+fn format_number(value: f64) -> String {
     let size = value.abs();
     if value == 0.0 || !(1e-3..1e6).contains(&size) {
         return format!("{value:.3e}");
@@ -152,8 +152,8 @@ pub mod tests {
     }
 
     /// Builds an outcome from a report.
-    pub fn outcome(report: &str, status: Option<&str>) -> Outcome {
-        let mut outcome = Outcome::new("ch2/plate");
+    pub fn outcome(report: &str, status: Option<&str>) -> CaseOutcome {
+        let mut outcome = CaseOutcome::new("ch2/plate");
         outcome.judge(serde_json::from_str(report).expect("a report"), status.map(str::to_owned), false);
         outcome
     }

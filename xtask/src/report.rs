@@ -10,10 +10,10 @@ use miette::{IntoDiagnostic, Result, miette};
 use polycore::file::atomic_write;
 use serde::Serialize;
 
-use crate::outcome::Outcome;
+use crate::outcome::CaseOutcome;
 use crate::summary;
 use crate::test::{self, Records};
-use crate::workspace::Workspace;
+use crate::workspace::Repository;
 
 mod baseline;
 mod cross;
@@ -28,25 +28,25 @@ mod stability;
 mod thesis;
 mod timing;
 
-use baseline::{Baseline, Difference};
-use pictures::{Gallery, Picture};
+use baseline::{EarlierReport, ReportDifference};
+use pictures::{Gallery, ReportPicture};
 
 /// Pictures shown of each case in the list of cases.
 const PICTURES: usize = 6;
 
 /// Sources of the report besides the outcomes.
 pub struct Sources {
-    map: thesis::Map,
+    map: thesis::ThesisMap,
     errata: Vec<errata::Erratum>,
     /// Measurements of the last run of the tests.
     records: Records,
-    baseline: Option<Baseline>,
+    baseline: Option<EarlierReport>,
 }
 
 impl Sources {
     /// Reads cases/thesis.toml, docs/errata.md and an earlier report.
-    pub fn read(workspace: &Workspace, baseline: Option<&Path>) -> Result<Self> {
-        let map = thesis::Map::read(workspace)?;
+    pub fn read(workspace: &Repository, baseline: Option<&Path>) -> Result<Self> {
+        let map = thesis::ThesisMap::read(workspace)?;
         let errata = errata::Erratum::read(workspace)?;
         let mut faults = map.faults(workspace);
         faults.extend(errata::faults(workspace, &errata, &map.erratum));
@@ -54,7 +54,7 @@ impl Sources {
             return Err(miette!("cases/thesis.toml:\n{}", faults.join("\n")));
         }
         let records = test::read(workspace);
-        Ok(Self { map, errata, records, baseline: baseline.map(Baseline::read).transpose()? })
+        Ok(Self { map, errata, records, baseline: baseline.map(EarlierReport::read).transpose()? })
     }
 }
 
@@ -83,14 +83,14 @@ struct Page {
     seconds: f64,
     counts: Vec<(String, usize)>,
     kinds: Vec<(String, usize)>,
-    thesis: Vec<thesis::Judged>,
-    links: Vec<thesis::Judged>,
-    others: Vec<others::Other>,
-    timing: Vec<timing::Measured>,
-    stability: Vec<stability::Trial>,
-    errata: Vec<errata::Proven>,
-    cross: Vec<cross::Crossed>,
-    difference: Option<Difference>,
+    thesis: Vec<thesis::RowVerdict>,
+    links: Vec<thesis::RowVerdict>,
+    others: Vec<others::ExternalFigure>,
+    timing: Vec<timing::TimingSubject>,
+    stability: Vec<stability::StabilityTrial>,
+    errata: Vec<errata::ErratumVerdict>,
+    cross: Vec<cross::CrossCheck>,
+    difference: Option<ReportDifference>,
     cases: Vec<CaseView>,
 }
 
@@ -114,7 +114,7 @@ struct CaseView {
     complaint: String,
     rows: Vec<[String; 6]>,
     missed: usize,
-    pictures: Vec<Picture>,
+    pictures: Vec<ReportPicture>,
     work: Vec<(String, String)>,
 }
 
@@ -131,14 +131,14 @@ struct Json<'a> {
     /// Expectations by what kind of evidence they are.
     kinds: BTreeMap<String, usize>,
     cases: Vec<JsonCase<'a>>,
-    thesis: Vec<thesis::Judged>,
-    links: Vec<thesis::Judged>,
-    others: Vec<others::Other>,
-    timing: Vec<timing::Measured>,
-    stability: Vec<stability::Trial>,
-    errata: Vec<errata::Proven>,
-    cross_checks: Vec<cross::Crossed>,
-    difference: Option<Difference>,
+    thesis: Vec<thesis::RowVerdict>,
+    links: Vec<thesis::RowVerdict>,
+    others: Vec<others::ExternalFigure>,
+    timing: Vec<timing::TimingSubject>,
+    stability: Vec<stability::StabilityTrial>,
+    errata: Vec<errata::ErratumVerdict>,
+    cross_checks: Vec<cross::CrossCheck>,
+    difference: Option<ReportDifference>,
 }
 
 #[derive(Serialize)]
@@ -155,7 +155,7 @@ struct JsonCase<'a> {
 }
 
 impl<'a> JsonCase<'a> {
-    fn of(outcome: &'a Outcome) -> Self {
+    fn new(outcome: &'a CaseOutcome) -> Self {
         let work = outcome.report.iter().flat_map(|report| &report.work);
         Self {
             case: &outcome.case,
@@ -173,9 +173,9 @@ impl<'a> JsonCase<'a> {
 
 /// Writes the report; the paths of what was written.
 pub fn write(
-    workspace: &Workspace,
+    workspace: &Repository,
     sources: &Sources,
-    outcomes: &[Outcome],
+    outcomes: &[CaseOutcome],
     tier: Tier,
 ) -> Result<Vec<PathBuf>> {
     let folder = workspace.results("validation")?;
@@ -204,14 +204,14 @@ fn put(path: &Path, bytes: &[u8]) -> Result<()> {
 }
 
 fn page(
-    workspace: &Workspace,
+    workspace: &Repository,
     folder: &Path,
     sources: &Sources,
-    outcomes: &[Outcome],
+    outcomes: &[CaseOutcome],
     tier: Tier,
 ) -> Result<Page> {
     let mut gallery = Gallery::default();
-    let found = evidence::Found { outcomes, records: &sources.records, root: workspace.root() };
+    let found = evidence::MeasuredNumbers { outcomes, records: &sources.records, root: workspace.root() };
     let [thesis, links] = sources.map.judge(&found, &mut gallery);
     let provenance: Vec<&Provenance> =
         outcomes.iter().filter_map(|outcome| Some(&outcome.report.as_ref()?.provenance)).collect();
@@ -228,7 +228,7 @@ fn page(
         }
     }
     Ok(Page {
-        passed: outcomes.iter().all(Outcome::passed),
+        passed: outcomes.iter().all(CaseOutcome::passed),
         everything: tier.everything,
         tier: if tier.quick { "quick" } else { "full" },
         sums: summary::sums(outcomes),
@@ -256,7 +256,7 @@ fn page(
     })
 }
 
-fn view(workspace: &Workspace, outcome: &Outcome, gallery: &mut Gallery) -> CaseView {
+fn view(workspace: &Repository, outcome: &CaseOutcome, gallery: &mut Gallery) -> CaseView {
     let short = |path: &Path| workspace.short(path).to_string();
     let work = outcome.report.iter().flat_map(|report| &report.work);
     CaseView {
@@ -282,7 +282,7 @@ fn view(workspace: &Workspace, outcome: &Outcome, gallery: &mut Gallery) -> Case
 }
 
 /// The page without its pictures, and the cases with their judgements.
-fn json(page: Page, outcomes: &[Outcome]) -> Json<'_> {
+fn json(page: Page, outcomes: &[CaseOutcome]) -> Json<'_> {
     Json {
         version: 1,
         passed: page.passed,
@@ -292,11 +292,11 @@ fn json(page: Page, outcomes: &[Outcome]) -> Json<'_> {
         machine: page.machine,
         versions: page.versions,
         kinds: page.kinds.into_iter().collect(),
-        cases: outcomes.iter().map(JsonCase::of).collect(),
+        cases: outcomes.iter().map(JsonCase::new).collect(),
         others: page.others,
-        thesis: page.thesis.into_iter().map(thesis::Judged::without_pictures).collect(),
-        links: page.links.into_iter().map(thesis::Judged::without_pictures).collect(),
-        timing: page.timing.into_iter().map(timing::Measured::without_picture).collect(),
+        thesis: page.thesis.into_iter().map(thesis::RowVerdict::without_pictures).collect(),
+        links: page.links.into_iter().map(thesis::RowVerdict::without_pictures).collect(),
+        timing: page.timing.into_iter().map(timing::TimingSubject::without_picture).collect(),
         stability: page.stability,
         errata: page.errata,
         cross_checks: page.cross,
@@ -319,7 +319,7 @@ fn anchor(name: &str) -> String {
 }
 
 /// Path of a file relative to target/validation.
-pub fn link(workspace: &Workspace, file: &Path) -> String {
+pub fn link(workspace: &Repository, file: &Path) -> String {
     match (workspace.target().strip_prefix(workspace.root()), file.strip_prefix(workspace.root())) {
         (Ok(target), Ok(below)) => {
             let up = "../".repeat(target.components().count() + 1);

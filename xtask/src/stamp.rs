@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 /// Provenance of a bench's rows, or of a number that a test measured.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Stamp {
+pub struct SourceStamp {
     /// The commit that was checked out.
     commit: String,
     /// UTC, ISO 8601.
@@ -22,7 +22,7 @@ pub struct Stamp {
     hash: String,
 }
 
-impl Stamp {
+impl SourceStamp {
     /// Creates the provenance of a measurement made now from `sources`.
     pub fn new(root: &Path, sources: &[String]) -> Result<Self> {
         let provenance = Report::new("xtask", env!("CARGO_PKG_VERSION"), "").provenance;
@@ -43,7 +43,7 @@ impl Stamp {
 }
 
 /// `2026-11-22, commit 0123456789, AMD EPYC`.
-impl fmt::Display for Stamp {
+impl fmt::Display for SourceStamp {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let day = self.date.split('T').next().unwrap_or(&self.date);
         write!(f, "{day}, commit {:.10}, {}", self.commit, self.machine)
@@ -111,7 +111,7 @@ mod tests {
         write("crates/polycore/src/tensor.rs", "");
         let sources = sources(root.path(), &["peri"], &["src", "tests"]);
         assert_eq!(sources, ["crates/peri/src", "crates/polycore/src/tensor.rs"]);
-        let stamp = Stamp::new(root.path(), &sources).expect("a stamp");
+        let stamp = SourceStamp::new(root.path(), &sources).expect("a stamp");
         write("crates/crystfem/src/lib.rs", "");
         assert!(stamp.fresh(root.path()));
         write("crates/peri/src/a/b.rs", "fn b() { }");
@@ -120,6 +120,6 @@ mod tests {
         assert!(stamp.fresh(root.path()));
         write("crates/peri/src/a/c.rs", "");
         assert!(!stamp.fresh(root.path()), "a new file");
-        assert!(Stamp::new(root.path(), &["crates/none".to_owned()]).is_err());
+        assert!(SourceStamp::new(root.path(), &["crates/none".to_owned()]).is_err());
     }
 }

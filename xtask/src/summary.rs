@@ -4,13 +4,13 @@ use std::fmt::Write as _;
 
 use harness::report::Kind;
 
-use crate::outcome::Outcome;
-use crate::table::Table;
+use crate::outcome::CaseOutcome;
+use crate::table::TextTable;
 
 /// Every expectation of every case, seconds by case, and a last line of sums.
-pub fn text(outcomes: &[Outcome]) -> String {
-    let mut table = Table::new(["case", "quantity", "value", "expected", "kind", "verdict"]);
-    let mut times = Table::new(["case", "program", "seconds", "expectations", "not satisfied"]);
+pub fn text(outcomes: &[CaseOutcome]) -> String {
+    let mut table = TextTable::new(["case", "quantity", "value", "expected", "kind", "verdict"]);
+    let mut times = TextTable::new(["case", "program", "seconds", "expectations", "not satisfied"]);
     for outcome in outcomes {
         for [verdict, quantity, value, asked, kind, _] in outcome.rows() {
             table.push([outcome.case.clone(), quantity, value, asked, kind, verdict]);
@@ -34,9 +34,9 @@ pub fn text(outcomes: &[Outcome]) -> String {
 }
 
 /// `22 cases, 0 failed; 282 expectations, 0 not satisfied: 120 closed-form, 40 published; 25 regression (no evidence)`.
-pub fn sums(outcomes: &[Outcome]) -> String {
+pub fn sums(outcomes: &[CaseOutcome]) -> String {
     let failed = outcomes.iter().filter(|outcome| !outcome.passed()).count();
-    let judged = || outcomes.iter().flat_map(Outcome::expect);
+    let judged = || outcomes.iter().flat_map(CaseOutcome::expect);
     let missed = judged().filter(|judgement| !judgement.pass).count();
     let plural = if outcomes.len() == 1 { "" } else { "s" };
     let [cases, expectations] = [outcomes.len(), judged().count()];
@@ -57,9 +57,9 @@ pub fn sums(outcomes: &[Outcome]) -> String {
 }
 
 /// Counts the expectations of each kind.
-pub fn kinds(outcomes: &[Outcome]) -> Vec<(Kind, usize)> {
+pub fn kinds(outcomes: &[CaseOutcome]) -> Vec<(Kind, usize)> {
     let count = |kind: Kind| {
-        let judged = outcomes.iter().flat_map(Outcome::expect);
+        let judged = outcomes.iter().flat_map(CaseOutcome::expect);
         (kind, judged.filter(|judgement| judgement.expect.kind == kind).count())
     };
     Kind::ALL.map(count).into_iter().filter(|(_, count)| *count > 0).collect()

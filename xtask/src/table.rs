@@ -10,12 +10,12 @@ pub fn print(text: &str) {
 }
 
 /// A heading and rows of as many cells.
-pub struct Table<const N: usize> {
+pub struct TextTable<const N: usize> {
     heading: [&'static str; N],
     rows: Vec<[String; N]>,
 }
 
-impl<const N: usize> Table<N> {
+impl<const N: usize> TextTable<N> {
     /// Without rows.
     pub fn new(heading: [&'static str; N]) -> Self {
         Self { heading, rows: Vec::new() }
@@ -56,7 +56,7 @@ mod tests {
 
     #[test]
     fn text_is_aligned_and_markdown_escaped() {
-        let mut table = Table::new(["λ", "name"]);
+        let mut table = TextTable::new(["λ", "name"]);
         table.push(["12".into(), "a|b".into()]);
         assert_eq!(table.text(), "λ   name\n12  a|b\n");
         assert_eq!(table.markdown(), "| λ | name |\n|---|---|\n| 12 | a\\|b |\n");

@@ -11,16 +11,16 @@ use polycore::file::atomic_write;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use crate::stamp::{Stamp, sources};
+use crate::stamp::{SourceStamp, sources};
 use crate::table::print;
-use crate::workspace::Workspace;
+use crate::workspace::Repository;
 
 /// Environment variable that crate `evidence` reads.
 const FOLDER: &str = "EVIDENCE_FOLDER";
 
 /// A number as a test measured it, the file of crate `evidence` in words of Rust.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Record {
+pub struct TestRecord {
     /// Name, as cases/thesis.toml refers to it.
     pub name: String,
     /// A number, or `NaN`, `inf`.
@@ -40,7 +40,7 @@ pub struct Record {
     /// `crates/peri/src/calibrate.rs`.
     pub file: String,
     /// Provenance of the test run; `None` in a file that a test has just written.
-    pub stamp: Option<Stamp>,
+    pub stamp: Option<SourceStamp>,
 }
 
 /// Requirement that a test could not find.
@@ -52,15 +52,15 @@ struct Skip {
 
 #[derive(Deserialize)]
 #[serde(untagged)]
-enum Left {
+enum StoredRecord {
     Skip(Skip),
-    Record(Box<Record>),
+    Record(Box<TestRecord>),
 }
 
 /// All records by name.
-pub type Records = BTreeMap<String, Record>;
+pub type Records = BTreeMap<String, TestRecord>;
 
-impl Record {
+impl TestRecord {
     /// The value and what was requested, for a reader.
     pub fn cells(&self) -> [String; 2] {
         let mut expect = json!({ "quantity": self.name, "kind": "bound", "source": "a test" });
@@ -89,7 +89,7 @@ impl Record {
 }
 
 /// Runs the tests; `arguments` go to `cargo test`.
-pub fn run(workspace: &Workspace, arguments: &[String]) -> Result<bool> {
+pub fn run(workspace: &Repository, arguments: &[String]) -> Result<bool> {
     let folder = workspace.results("evidence")?;
     fs::remove_dir_all(&folder).into_diagnostic()?;
     fs::create_dir_all(&folder).into_diagnostic()?;
@@ -108,8 +108,8 @@ pub fn run(workspace: &Workspace, arguments: &[String]) -> Result<bool> {
 }
 
 /// Earlier records, and new ones with stamps of their crates' sources.
-fn stamped(workspace: &Workspace, mut records: Records, new: Vec<Record>) -> Result<Records> {
-    let mut stamps = BTreeMap::<String, Stamp>::new();
+fn stamped(workspace: &Repository, mut records: Records, new: Vec<TestRecord>) -> Result<Records> {
+    let mut stamps = BTreeMap::<String, SourceStamp>::new();
     for mut record in new {
         let of = record.file.strip_prefix("crates/").and_then(|rest| rest.split('/').next());
         let key = of.unwrap_or_default().to_owned();
@@ -118,7 +118,7 @@ fn stamped(workspace: &Workspace, mut records: Records, new: Vec<Record>) -> Res
             let crates = of.map_or_else(|| workspace.programs(), |name| vec![name.to_owned()]);
             let crates: Vec<&str> = crates.iter().map(String::as_str).collect();
             let sources = sources(workspace.root(), &crates, &["src", "tests"]);
-            stamps.insert(key.clone(), Stamp::new(workspace.root(), &sources)?);
+            stamps.insert(key.clone(), SourceStamp::new(workspace.root(), &sources)?);
         }
         record.stamp = stamps.get(&key).cloned();
         records.insert(record.name.clone(), record);
@@ -127,14 +127,14 @@ fn stamped(workspace: &Workspace, mut records: Records, new: Vec<Record>) -> Res
 }
 
 /// The records of the last runs; none where there was no run.
-pub fn read(workspace: &Workspace) -> Records {
+pub fn read(workspace: &Repository) -> Records {
     let text = fs::read_to_string(workspace.target().join("evidence.json")).unwrap_or_default();
-    let records: Vec<Record> = serde_json::from_str(&text).unwrap_or_default();
+    let records: Vec<TestRecord> = serde_json::from_str(&text).unwrap_or_default();
     records.into_iter().map(|record| (record.name.clone(), record)).collect()
 }
 
 /// Reads the records that tests have left in the folder.
-fn collect(folder: &Path) -> Result<(Vec<Record>, Vec<Skip>)> {
+fn collect(folder: &Path) -> Result<(Vec<TestRecord>, Vec<Skip>)> {
     let (mut records, mut skips) = (Vec::new(), Vec::new());
     for entry in fs::read_dir(folder).into_diagnostic()? {
         let path = entry.into_diagnostic()?.path();
@@ -144,8 +144,8 @@ fn collect(folder: &Path) -> Result<(Vec<Record>, Vec<Skip>)> {
         let text =
             fs::read_to_string(&path).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
         match serde_json::from_str(&text).map_err(|error| miette!("{}: {error}", path.display()))? {
-            Left::Skip(skip) => skips.push(skip),
-            Left::Record(record) => records.push(*record),
+            StoredRecord::Skip(skip) => skips.push(skip),
+            StoredRecord::Record(record) => records.push(*record),
         }
     }
     skips.sort_by(|a, b| a.skipped.cmp(&b.skipped));
@@ -174,8 +174,8 @@ mod tests {
         };
         write("crates/peri/src/main.rs", "1");
         write("crates/crystfem/src/main.rs", "1");
-        let workspace = Workspace::new(root.path().to_path_buf());
-        let record = |name: &str, value: f64, file: &str| -> Record {
+        let workspace = Repository::new(root.path().to_path_buf());
+        let record = |name: &str, value: f64, file: &str| -> TestRecord {
             let text =
                 json!({ "name": name, "value": value, "at_most": 5, "met": true, "test": "t", "file": file });
             serde_json::from_value(text).expect("a record")

@@ -7,7 +7,7 @@ use std::process::Command;
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
 
 use crate::table::print;
-use crate::workspace::Workspace;
+use crate::workspace::Repository;
 
 /// Longer source files want to be two.
 const MOST_LINES: usize = 500;
@@ -16,7 +16,7 @@ const MOST_LINES: usize = 500;
 const MOST_BYTES: u64 = 1_000_000;
 
 /// Prints every finding; passes if there is none.
-pub fn run(workspace: &Workspace) -> Result<bool> {
+pub fn run(workspace: &Repository) -> Result<bool> {
     let files = tracked(workspace.root())?;
     let mut findings = Vec::new();
     for file in &files {

@@ -8,11 +8,11 @@ use harness::case::Shard;
 use harness::scene::Source;
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
 
-use crate::outcome::Outcome;
+use crate::outcome::CaseOutcome;
 use crate::report;
 use crate::summary;
 use crate::table::print;
-use crate::workspace::Workspace;
+use crate::workspace::Repository;
 
 mod execute;
 
@@ -49,14 +49,14 @@ pub struct Options {
 }
 
 /// A case file and its name, the folder below cases/.
-pub struct Case {
+pub struct CaseFile {
     name: String,
     file: PathBuf,
     /// The folder of all cases.
     root: PathBuf,
 }
 
-impl Case {
+impl CaseFile {
     /// Names and files of the scenes whose results it reads; what is wrong with them its program says.
     fn named_inputs(&self) -> Vec<(String, PathBuf)> {
         let Ok(source) = Source::read(&self.file) else { return Vec::new() };
@@ -77,13 +77,13 @@ impl Case {
 
 /// Puts cases behind those whose results they read; otherwise they keep their order. Those in a cycle come last: their program
 /// names it.
-fn in_order(cases: Vec<Case>) -> Vec<Case> {
+fn sort_by_inputs(cases: Vec<CaseFile>) -> Vec<CaseFile> {
     let mut waiting = cases;
-    let mut ordered: Vec<Case> = Vec::new();
+    let mut ordered: Vec<CaseFile> = Vec::new();
     loop {
         let files: Vec<PathBuf> = waiting.iter().map(|case| case.file.clone()).collect();
-        let is_ready = |case: &Case| case.inputs().iter().all(|input| !files.contains(input));
-        let (ready, rest): (Vec<Case>, Vec<Case>) = waiting.into_iter().partition(is_ready);
+        let is_ready = |case: &CaseFile| case.inputs().iter().all(|input| !files.contains(input));
+        let (ready, rest): (Vec<CaseFile>, Vec<CaseFile>) = waiting.into_iter().partition(is_ready);
         if ready.is_empty() {
             ordered.extend(rest);
             return ordered;
@@ -94,7 +94,7 @@ fn in_order(cases: Vec<Case>) -> Vec<Case> {
 }
 
 /// A number of each case, counted from 0, that cases have in common that read results of each other.
-fn chains(cases: &[Case]) -> Vec<usize> {
+fn chains(cases: &[CaseFile]) -> Vec<usize> {
     let mut of: Vec<usize> = (0..cases.len()).collect();
     for (index, case) in cases.iter().enumerate() {
         for input in case.inputs() {
@@ -110,7 +110,7 @@ fn chains(cases: &[Case]) -> Vec<usize> {
 }
 
 /// Runs, prints, writes target/validation/{report.html, report.json}; passes if every case did.
-pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
+pub fn run(workspace: &Repository, options: &Options) -> Result<bool> {
     let mut cases = find(workspace, options)?;
     if let Some(shard) = options.shard {
         let chains = chains(&cases);
@@ -127,7 +127,7 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     };
     let mut built = BTreeMap::new();
     let mut release = |program: &str| {
-        let build = || workspace.release(program).map_err(|error| error.to_string());
+        let build = || workspace.build_program(program).map_err(|error| error.to_string());
         let executable = built.entry(program.to_owned()).or_insert_with(build).clone();
         executable.map_err(|reason| miette!("{reason}"))
     };
@@ -149,24 +149,24 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     }
     print(&format!("{}\n", summary::text(&outcomes)));
     if options.shard.is_some() {
-        return Ok(outcomes.iter().all(Outcome::passed));
+        return Ok(outcomes.iter().all(CaseOutcome::passed));
     }
     let everything = options.only.is_empty() && options.case.is_empty();
     let tier = report::Tier { quick: options.quick, everything };
     for path in report::write(workspace, &map, &outcomes, tier)? {
         print(&format!("written: {}\n", workspace.short(&path)));
     }
-    Ok(outcomes.iter().all(Outcome::passed))
+    Ok(outcomes.iter().all(CaseOutcome::passed))
 }
 
 /// Command with which a user runs a case.
-fn command(outcome: &Outcome, quick: bool) -> String {
+fn command(outcome: &CaseOutcome, quick: bool) -> String {
     let quick = if quick { " --quick" } else { "" };
     format!("cargo run --release -p {} -- run {}{quick}", outcome.program, outcome.file)
 }
 
 /// The cases requested, in alphabetical order, each behind those whose results it reads.
-fn find(workspace: &Workspace, options: &Options) -> Result<Vec<Case>> {
+fn find(workspace: &Repository, options: &Options) -> Result<Vec<CaseFile>> {
     let all = workspace.root().join("cases");
     let mut files = Vec::new();
     for path in &options.case {
@@ -187,8 +187,8 @@ fn find(workspace: &Workspace, options: &Options) -> Result<Vec<Case>> {
     if files.is_empty() {
         return Err(miette!("no case.toml found; cases live in {}", workspace.short(&all)));
     }
-    let case = |file: PathBuf| Case { name: name(&all, &file), file, root: all.clone() };
-    Ok(in_order(files.into_iter().map(case).collect()))
+    let case = |file: PathBuf| CaseFile { name: name(&all, &file), file, root: all.clone() };
+    Ok(sort_by_inputs(files.into_iter().map(case).collect()))
 }
 
 fn walk(folder: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
@@ -239,7 +239,7 @@ mod tests {
             let file = folder.join("case.toml");
             let text = input.map_or(String::new(), |input| format!("[inputs]\na = '../{input}/case.toml'"));
             fs::write(&file, text).expect("a scene");
-            Case { name: name.to_owned(), file, root: root.clone() }
+            CaseFile { name: name.to_owned(), file, root: root.clone() }
         };
         let cases = vec![
             case("a", Some("c")),
@@ -250,7 +250,7 @@ mod tests {
         ];
         // a → c → d, b and e
         assert_eq!(chains(&cases), [1, 0, 1, 1, 2]);
-        let names: Vec<String> = in_order(cases).into_iter().map(|case| case.name).collect();
+        let names: Vec<String> = sort_by_inputs(cases).into_iter().map(|case| case.name).collect();
         assert_eq!(names, ["b", "d", "c", "a", "e"]);
     }
 }

@@ -7,12 +7,12 @@ use std::process::{Command, Stdio};
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
 
 /// The workspace that this xtask was built in.
-pub struct Workspace {
+pub struct Repository {
     root: PathBuf,
     target: PathBuf,
 }
 
-impl Workspace {
+impl Repository {
     /// Creates the paths, with build products where cargo puts them.
     pub fn new(root: PathBuf) -> Self {
         let root = root.canonicalize().unwrap_or(root);
@@ -60,7 +60,7 @@ impl Workspace {
     }
 
     /// Builds one of our programs and gives the path of its executable.
-    pub fn release(&self, program: &str) -> Result<PathBuf> {
+    pub fn build_program(&self, program: &str) -> Result<PathBuf> {
         let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
         let package = self.package(program).filter(|_| !program.is_empty() && program.chars().all(plain));
         let Some(package) = package else {

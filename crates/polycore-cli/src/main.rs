@@ -20,7 +20,7 @@ mod cli {
     pub mod material;
     pub mod quantities;
     pub mod scene;
-    pub mod set;
+    pub mod table_fits;
     pub mod trials;
 }
 
@@ -43,11 +43,11 @@ impl case::Case for Fits {
     type Error = Error;
 
     fn explain(source: &Source, _quick: bool) -> Result<Vec<String>, Failure<Error>> {
-        Ok(scene::Case::parse(source)?.plan().lines().map(str::to_owned).collect())
+        Ok(scene::FitCase::parse(source)?.plan().lines().map(str::to_owned).collect())
     }
 
     fn solve(source: &Source, run: &mut Run) -> Result<Finished, Failure<Error>> {
-        Ok(fits::run(&scene::Case::parse(source)?, run)?)
+        Ok(fits::run(&scene::FitCase::parse(source)?, run)?)
     }
 
     fn schema() -> serde_json::Value {

@@ -48,7 +48,7 @@ impl Cuboid {
 
 /// Intersection of a cell and a box.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Part {
+struct OverlapPart {
     cell: u32,
     volume: f64,
     /// Natural coordinates of its middle in the cell.
@@ -61,7 +61,7 @@ pub struct Overlap {
     cells: Vec<[u32; 8]>,
     nodes: usize,
     /// The parts of each box.
-    parts: Groups<Part>,
+    parts: Groups<OverlapPart>,
 }
 
 impl Overlap {
@@ -77,7 +77,7 @@ impl Overlap {
             return fail(format!("box {index} of a transfer, {:?}", boxes[index]), "without volume");
         }
         let bins = Bins::new(boxes);
-        let mut found: Vec<(u32, Part)> = Vec::new();
+        let mut found: Vec<(u32, OverlapPart)> = Vec::new();
         for (index, cell) in cells.iter().enumerate() {
             if cell
                 .iter()
@@ -203,7 +203,7 @@ impl Overlap {
         Ok(sums.into_iter().map(mean).collect())
     }
 
-    fn means(&self, value: impl Fn(&Part) -> f64) -> Vec<Option<f64>> {
+    fn means(&self, value: impl Fn(&OverlapPart) -> f64) -> Vec<Option<f64>> {
         let of_box =
             |index| {
                 let parts = self.parts.group(index).iter();
@@ -269,7 +269,7 @@ fn is_box(corners: &[[f64; 3]; 8], bounds: &Cuboid) -> bool {
 }
 
 /// Returns the intersection of two boxes.
-fn cut(cell: &Cuboid, other: &Cuboid, number: u32) -> Option<Part> {
+fn cut(cell: &Cuboid, other: &Cuboid, number: u32) -> Option<OverlapPart> {
     let (mut volume, mut place) = (1.0, [0.0; 3]);
     for d in 0..3 {
         let (low, high) = (cell.min[d].max(other.min[d]), cell.max[d].min(other.max[d]));
@@ -280,11 +280,11 @@ fn cut(cell: &Cuboid, other: &Cuboid, number: u32) -> Option<Part> {
         volume *= high - low;
         place[d] = (low + high - cell.min[d] - cell.max[d]) / (cell.max[d] - cell.min[d]);
     }
-    Some(Part { cell: number, volume, place })
+    Some(OverlapPart { cell: number, volume, place })
 }
 
 /// Gauss points of a hexahedron in n³ pieces: volume and natural coordinates, and the point itself.
-fn gauss_points(corners: &[[f64; 3]; 8], number: u32, n: usize) -> Vec<(Part, [f64; 3])> {
+fn gauss_points(corners: &[[f64; 3]; 8], number: u32, n: usize) -> Vec<(OverlapPart, [f64; 3])> {
     let step = 2.0 / n as f64;
     let at = |k: usize| {
         let sign = if k.is_multiple_of(2) { -1.0 } else { 1.0 };
@@ -308,7 +308,7 @@ fn gauss_points(corners: &[[f64; 3]; 8], number: u32, n: usize) -> Vec<(Part, [f
         let [a, b, c] = jacobian;
         let determinant = a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0])
             + a[2] * (b[0] * c[1] - b[1] * c[0]);
-        points.push((Part { cell: number, volume: determinant * (0.5 * step).powi(3), place }, point));
+        points.push((OverlapPart { cell: number, volume: determinant * (0.5 * step).powi(3), place }, point));
     }
     points
 }

@@ -11,11 +11,11 @@ const NAME: usize = 80;
 const CUT: f64 = 0.25;
 
 /// A material with its name and constants.
-type Known = (Vec<u8>, Vec<f64>, Material);
+type CachedMaterial = (Vec<u8>, Vec<f64>, Material);
 
 thread_local! {
     /// The last material on this thread: hosts call once an integration point and iteration.
-    static LAST: RefCell<Option<Known>> = const { RefCell::new(None) };
+    static LAST: RefCell<Option<CachedMaterial>> = const { RefCell::new(None) };
 }
 
 fn with<R>(name: &[u8], constants: &[f64], work: impl FnOnce(&Material) -> R) -> R {

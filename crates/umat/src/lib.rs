@@ -1,12 +1,12 @@
 //! Materials of this workspace as UMAT: `umat_`, as Abaqus calls it, and `umat_user_`, CalculiX' own, in `libumat`.
 //!
-//! The name of the material in the input of the host chooses: a hyperelastic law of [`polycore`] (`EIGHT_CHAIN`, `NEO_HOOKEAN`, …, [`Rubber`])
+//! The name of the material in the input of the host chooses: a hyperelastic law of [`polycore`] (`EIGHT_CHAIN`, `NEO_HOOKEAN`, …, [`RubberMaterial`])
 //! or the solidifying body of prints (`PRINTED_PA12`, [`Print`]); CalculiX wants `USER_` before it. `umatht_` is in the library, too.
 //!
 //! ```
-//! use umat::Rubber;
+//! use umat::RubberMaterial;
 //! // K, then C_R and N of the eight-chain law, in the host's unit of stress
-//! let rubber = Rubber::new("eight-chain", &[100.0, 0.3, 25.0])?;
+//! let rubber = RubberMaterial::new("eight-chain", &[100.0, 0.3, 25.0])?;
 //! let twice = [2.0, 0.0, 0.0, 0.0, 0.8, 0.0, 0.0, 0.0, 0.7];
 //! let (stress, _) = rubber.cauchy(&twice)?;
 //! assert!(stress[0] > stress[1] && stress[3] == 0.0);
@@ -20,7 +20,7 @@ mod rubber;
 mod tests;
 
 pub use print::{Dissipation, Print};
-pub use rubber::Rubber;
+pub use rubber::RubberMaterial;
 
 /// Why a material cannot be made, or has no stress.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -43,7 +43,7 @@ impl Error {
 /// A material of a host's input.
 pub enum Material {
     /// Hyperelastic: no state.
-    Rubber(Rubber),
+    Rubber(RubberMaterial),
     /// Solidifying: [`Print::STATES`] state variables.
     Print(Box<Print>),
 }
@@ -65,7 +65,7 @@ impl Material {
         let keys = rubber::names();
         // the longest: `eight-chain` begins `eight-chain-root-i2`
         match keys.iter().filter(|key| is(key)).max_by_key(|key| key.len()) {
-            Some(key) => Ok(Self::Rubber(Rubber::new(key, constants)?)),
+            Some(key) => Ok(Self::Rubber(RubberMaterial::new(key, constants)?)),
             None => {
                 let allowed =
                     format!("{}, {}", keys.join(", "), Print::NAME).to_uppercase().replace('-', "_");

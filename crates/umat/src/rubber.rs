@@ -7,7 +7,7 @@ use polycore::tensor::voigt::{self, Voigt, Voigt6x6};
 use polycore::tensor::{DeformationGradient, Tensor};
 
 /// W₀(λ₁, λ₂, λ₃) − g ln J + ¼λ(J² − 1 − 2 ln J): a law of chapter 1 with a bulk modulus.
-pub struct Rubber {
+pub struct RubberMaterial {
     law: Compressible<Box<dyn Hyperelastic>>,
 }
 
@@ -16,7 +16,7 @@ pub(crate) fn names() -> Vec<&'static str> {
     MODELS.iter().map(|model| model.key).collect()
 }
 
-impl Rubber {
+impl RubberMaterial {
     /// A law by its key; constants are the bulk modulus K of small strains, then the parameters of the law, stresses in the host's unit.
     ///
     /// # Errors

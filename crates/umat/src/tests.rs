@@ -8,7 +8,7 @@ use polycore::tensor::Tensor;
 use polycore::tensor::voigt::{self, PAIRS, Voigt, Voigt6x6};
 
 /// Arguments that change from one call to the next.
-struct Call<'a> {
+struct UmatCall<'a> {
     name: &'a str,
     constants: &'a [f64],
     deformation: Tensor,
@@ -18,7 +18,7 @@ struct Call<'a> {
     turn: Tensor,
 }
 
-impl Call<'_> {
+impl UmatCall<'_> {
     /// σ, DDSDDE and PNEWDT.
     fn umat(&self, state: &mut [f64]) -> (Voigt, Voigt6x6, f64) {
         self.with_energies(state, &mut [0.0; 3])
@@ -75,9 +75,17 @@ impl Call<'_> {
     }
 }
 
-fn call<'a>(name: &'a str, constants: &'a [f64], deformation: Tensor) -> Call<'a> {
+fn call<'a>(name: &'a str, constants: &'a [f64], deformation: Tensor) -> UmatCall<'a> {
     let turn = Tensor::identity();
-    Call { name, constants, deformation, strain: [Voigt::zeros(); 2], temperature: [0.0; 2], time: 1.0, turn }
+    UmatCall {
+        name,
+        constants,
+        deformation,
+        strain: [Voigt::zeros(); 2],
+        temperature: [0.0; 2],
+        time: 1.0,
+        turn,
+    }
 }
 
 /// Nearly incompressible under uniaxial stress: σ₁₁ of the incompressible law, to μ/K.

@@ -48,7 +48,7 @@ impl From<crystfem::Error> for Error {
 }
 
 /// The material of a list of constants.
-pub struct Constants {
+pub struct HostMaterial {
     pub material: Semicrystalline,
     /// 0 of the host's temperature, K.
     pub absolute_zero: f64,
@@ -56,7 +56,7 @@ pub struct Constants {
     pub calculix: bool,
 }
 
-impl Constants {
+impl HostMaterial {
     fn new(list: &[f64]) -> Result<Self, Error> {
         let wrong = |place: usize, found: f64, allowed: &str| Error {
             name: NAMES[place],
@@ -143,18 +143,18 @@ impl Constants {
 
 thread_local! {
     /// The constants of the last call on this thread: hosts call once an integration point and iteration.
-    static LAST: RefCell<Option<(Vec<f64>, Constants)>> = const { RefCell::new(None) };
+    static LAST: RefCell<Option<(Vec<f64>, HostMaterial)>> = const { RefCell::new(None) };
 }
 
 /// Works with the material of a list of constants.
 ///
 /// # Errors
 /// A constant out of range.
-pub fn with<R>(list: &[f64], work: impl FnOnce(&Constants) -> R) -> Result<R, Error> {
+pub fn with<R>(list: &[f64], work: impl FnOnce(&HostMaterial) -> R) -> Result<R, Error> {
     LAST.with_borrow_mut(|last| {
         let (_, constants) = match last.take() {
             Some(kept) if kept.0 == list => last.insert(kept),
-            _ => last.insert((list.to_vec(), Constants::new(list)?)),
+            _ => last.insert((list.to_vec(), HostMaterial::new(list)?)),
         };
         Ok(work(constants))
     })

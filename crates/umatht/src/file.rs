@@ -9,11 +9,11 @@ use std::rc::Rc;
 const IN_FILE: f64 = 3.0;
 
 /// A name, the constants that the host gives, and the whole list.
-type Known = (String, Vec<f64>, Rc<[f64]>);
+type CachedList = (String, Vec<f64>, Rc<[f64]>);
 
 thread_local! {
     /// Constants of the last call on this thread.
-    static LAST: RefCell<Option<Known>> = const { RefCell::new(None) };
+    static LAST: RefCell<Option<CachedList>> = const { RefCell::new(None) };
 }
 
 /// Returns true if constants 7 to 15 of a list are in a file.

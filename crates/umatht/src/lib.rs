@@ -5,11 +5,11 @@
 //! state; whatever increment it repeats or cuts back gets the same answer.
 //!
 //! ```
-//! use umatht::{Increment, NAMES, State, respond};
+//! use umatht::{ThermalIncrement, NAMES, State, respond};
 //!
 //! // k, c, ΔH·X∞, column of Table 4.1; 1 s of cooling from 150 °C at 10 K/min
 //! let constants = [0.25, 2200.0, 0.0, 1.0];
-//! let at = Increment { temperature: 423.15, change: -10.0 / 60.0, time: 1.0, gradient: [100.0, 0.0, 0.0] };
+//! let at = ThermalIncrement { temperature: 423.15, change: -10.0 / 60.0, time: 1.0, gradient: [100.0, 0.0, 0.0] };
 //! let answer = respond(&constants, &at, &State::default())?;
 //! assert!(answer.state.degree > 0.0 && answer.flux[0] == -25.0);
 //! assert_eq!(NAMES[3], "kinetics");
@@ -22,13 +22,13 @@ mod host;
 
 pub use constants::{Error, NAMES};
 
-use constants::Constants;
+use constants::HostMaterial;
 use crystfem::material::{Point, ThermalMaterial};
 use nalgebra::Vector3;
 
 /// An increment at an integration point, in the units of the host: time in s, temperature from its own zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Increment {
+pub struct ThermalIncrement {
     /// Temperature at the start.
     pub temperature: f64,
     /// Change over the increment.
@@ -54,7 +54,7 @@ pub struct State {
 /// Response of the material at the end of an increment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
-pub struct Answer {
+pub struct ThermalResponse {
     /// The state there.
     pub state: State,
     /// Change of internal energy per mass over the increment.
@@ -73,12 +73,12 @@ pub struct Answer {
 ///
 /// # Errors
 /// [`Error`]: a constant out of range, a temperature that is not finite or below 0 K.
-pub fn respond(constants: &[f64], at: &Increment, state: &State) -> Result<Answer, Error> {
+pub fn respond(constants: &[f64], at: &ThermalIncrement, state: &State) -> Result<ThermalResponse, Error> {
     constants::with(constants, |constants| answer(constants, at, state))?
 }
 
-fn answer(constants: &Constants, at: &Increment, state: &State) -> Result<Answer, Error> {
-    let Constants { material, absolute_zero, calculix } = constants;
+fn answer(constants: &HostMaterial, at: &ThermalIncrement, state: &State) -> Result<ThermalResponse, Error> {
+    let HostMaterial { material, absolute_zero, calculix } = constants;
     let end = at.temperature + at.change + absolute_zero;
     // CalculiX hands over the last iterate for the temperature at the start
     let known = *calculix && state.temperature > 0.0;
@@ -100,7 +100,7 @@ fn answer(constants: &Constants, at: &Increment, state: &State) -> Result<Answer
         conductivity[k] = sign * entry;
     }
     let flux: Vector3<f64> = response.flux;
-    Ok(Answer {
+    Ok(ThermalResponse {
         state: State { z: new[0], degree: fields[0], temperature: end },
         energy: response.energy - material.energy(start, &old),
         slope: response.d_energy_d_temperature,
@@ -114,8 +114,8 @@ fn answer(constants: &Constants, at: &Increment, state: &State) -> Result<Answer
 mod tests {
     use super::*;
 
-    fn at(temperature: f64, change: f64) -> Increment {
-        Increment { temperature, change, time: 1.0, gradient: [1.0, 2.0, 3.0] }
+    fn at(temperature: f64, change: f64) -> ThermalIncrement {
+        ThermalIncrement { temperature, change, time: 1.0, gradient: [1.0, 2.0, 3.0] }
     }
 
     /// Own kinetics, those of column 1, with a melting point of 500 K.
@@ -140,7 +140,7 @@ mod tests {
     /// Crystals melt where their own constants say: at 460 K those of PA12 are gone, others are there, or never melt.
     #[test]
     fn melting_belongs_to_the_constants() {
-        let hot = Increment { gradient: [0.0; 3], ..at(440.0, 20.0) };
+        let hot = ThermalIncrement { gradient: [0.0; 3], ..at(440.0, 20.0) };
         let state = State { z: 2.0, ..State::default() };
         let degree = |constants: &[f64]| respond(constants, &hot, &state).unwrap().state.degree;
         let pa12 = degree(&[0.25, 2200.0, 0.0, 1.0]);
@@ -179,7 +179,7 @@ mod tests {
         let energy = |change: f64| respond(&constants, &at(430.0, change), &state).unwrap();
         let slope = (energy(-9.99).energy - energy(-10.01).energy) / 0.02;
         assert!((slope / energy(-10.0).slope - 1.0).abs() < 1e-5, "{slope}");
-        let still = respond(&constants, &Increment { time: 0.0, ..at(430.0, 0.0) }, &state).unwrap();
+        let still = respond(&constants, &ThermalIncrement { time: 0.0, ..at(430.0, 0.0) }, &state).unwrap();
         assert_eq!((still.energy, still.state.z), (0.0, 0.5));
     }
 

@@ -9,8 +9,8 @@ use miette::{IntoDiagnostic, Result, WrapErr, miette};
 use super::calculix::{self, Calculix};
 use super::scikit_fem::ScikitFem;
 use super::{Row, external};
-use crate::table::Table;
-use crate::workspace::Workspace;
+use crate::table::TextTable;
+use crate::workspace::Repository;
 
 /// Steps of a whole run.
 pub const STEPS: u32 = 20;
@@ -39,7 +39,7 @@ pub struct Brick {
 }
 
 /// Run of one program on one brick.
-struct Line {
+struct BrickRun {
     program: &'static str,
     edge: usize,
     /// Seconds a step, and before the first one.
@@ -55,7 +55,7 @@ struct Line {
 /// Runs all edges.
 pub fn run(
     program: &Path,
-    workspace: &Workspace,
+    workspace: &Repository,
     folder: &Path,
     distorted: bool,
     edges: &[usize],
@@ -65,7 +65,7 @@ pub fn run(
         .into_diagnostic()
         .wrap_err_with(|| format!("cannot create {}", folder.display()))?;
     let mut runs =
-        Runs { program: program.to_owned(), folder, distorted, lines: Vec::new(), rows: Vec::new() };
+        BrickBench { program: program.to_owned(), folder, distorted, lines: Vec::new(), rows: Vec::new() };
     let (calculix, scikit_fem) = (Calculix::find(), ScikitFem::find(workspace)?);
     let mut notes = String::new();
     for (name, found) in [("CalculiX", calculix.as_ref().err()), ("scikit-fem", scikit_fem.as_ref().err())] {
@@ -79,7 +79,7 @@ pub fn run(
         let rounds = if edge <= SHORT { SHORT_ROUNDS } else { ROUNDS };
         let lumped = (0..rounds).map(|_| Ok(vec![runs.ours(edge, true)?])).collect::<Result<_>>()?;
         runs.medians(lumped);
-        let mut all: Vec<Vec<Line>> = Vec::new();
+        let mut all: Vec<Vec<BrickRun>> = Vec::new();
         for _ in 0..rounds {
             let mut turn = vec![runs.ours(edge, false)?];
             if let (Ok(calculix), true) = (&calculix, beside) {
@@ -109,17 +109,17 @@ pub fn run(
     Ok(Brick { rows: runs.rows, text, passed })
 }
 
-struct Runs {
+struct BrickBench {
     program: PathBuf,
     folder: PathBuf,
     distorted: bool,
-    lines: Vec<Line>,
+    lines: Vec<BrickRun>,
     rows: Vec<Row>,
 }
 
-impl Runs {
+impl BrickBench {
     /// A run of ours with lumped capacity, or with consistent one, which the others take too.
-    fn ours(&self, edge: usize, lumped: bool) -> Result<Line> {
+    fn ours(&self, edge: usize, lumped: bool) -> Result<BrickRun> {
         let words = format!("brick --threads 1 --elements {edge} --steps {STEPS}");
         let mut arguments: Vec<String> = words.split(' ').map(str::to_owned).collect();
         if self.distorted {
@@ -136,7 +136,7 @@ impl Runs {
         let (Some(step), Some(mean)) = (of("step"), of("mean temperature")) else {
             return Err(miette!("the brick printed no time of a step"));
         };
-        Ok(Line {
+        Ok(BrickRun {
             program: if lumped { "crystfem, lumped" } else { "crystfem" },
             edge,
             step,
@@ -148,14 +148,14 @@ impl Runs {
         })
     }
 
-    fn calculix(&self, calculix: &Calculix, edge: usize) -> Result<Line> {
+    fn calculix(&self, calculix: &Calculix, edge: usize) -> Result<BrickRun> {
         let mesh = self.read_mesh(edge)?;
         // two lengths of runs: what a step takes, without reading the deck
         let short = calculix.run(&self.folder, &mesh, 2, "ITERATIVE SCALING")?;
         let long = calculix.run(&self.folder, &mesh, STEPS, "ITERATIVE SCALING")?;
         let step = (long.seconds - short.seconds) / f64::from(STEPS - 2);
         let difference = (self.difference(edge, &long.temperatures)?, SAME_CALCULIX);
-        Ok(Line {
+        Ok(BrickRun {
             program: "CalculiX, iterative scaling",
             edge,
             step,
@@ -170,11 +170,11 @@ impl Runs {
     /// Times the direct solver of CalculiX; three steps are enough.
     fn spooles(&mut self, calculix: &Calculix, edge: usize, rounds: usize) -> Result<()> {
         let mesh = self.read_mesh(edge)?;
-        let turn = || -> Result<Vec<Line>> {
+        let turn = || -> Result<Vec<BrickRun>> {
             let [one, three] = [1, 3].map(|steps| calculix.run(&self.folder, &mesh, steps, "SPOOLES"));
             let (one, three) = (one?, three?);
             let step = 0.5 * (three.seconds - one.seconds);
-            Ok(vec![Line {
+            Ok(vec![BrickRun {
                 program: "CalculiX, SPOOLES",
                 edge,
                 step,
@@ -190,10 +190,10 @@ impl Runs {
         Ok(())
     }
 
-    fn scikit_fem(&self, scikit_fem: &ScikitFem, edge: usize) -> Result<Line> {
+    fn scikit_fem(&self, scikit_fem: &ScikitFem, edge: usize) -> Result<BrickRun> {
         let run = scikit_fem.run(&self.folder, &self.file(edge, "inp"), STEPS)?;
         let temperatures = column(&self.folder.join("scikit-fem.csv"), "temperature")?;
-        Ok(Line {
+        Ok(BrickRun {
             program: "scikit-fem, CG",
             edge,
             step: run.looped / f64::from(STEPS),
@@ -206,12 +206,12 @@ impl Runs {
     }
 
     /// Takes turns over as lines and rows.
-    fn medians(&mut self, turns: Vec<Vec<Line>>) {
+    fn medians(&mut self, turns: Vec<Vec<BrickRun>>) {
         let mut turns = turns.into_iter();
         let Some(mut lines) = turns.next() else { return };
-        let others: Vec<Vec<Line>> = turns.collect();
+        let others: Vec<Vec<BrickRun>> = turns.collect();
         for (k, line) in lines.iter_mut().enumerate() {
-            let all = |of: &dyn Fn(&Line) -> f64| {
+            let all = |of: &dyn Fn(&BrickRun) -> f64| {
                 let mut values = vec![of(line)];
                 values.extend(others.iter().map(|turn| of(&turn[k])));
                 values.sort_by(f64::total_cmp);
@@ -240,7 +240,7 @@ impl Runs {
     }
 
     fn table(&self) -> String {
-        let mut table = Table::new([
+        let mut table = TextTable::new([
             "program",
             "nodes",
             "s/step",
@@ -320,12 +320,12 @@ impl Runs {
         self.folder.join(format!("brick-{edge}.{ending}"))
     }
 
-    fn read_mesh(&self, edge: usize) -> Result<calculix::Mesh> {
+    fn read_mesh(&self, edge: usize) -> Result<calculix::CalculixMesh> {
         let path = self.file(edge, "inp");
         let text = std::fs::read_to_string(&path)
             .into_diagnostic()
             .wrap_err_with(|| format!("cannot read {}", path.display()))?;
-        Ok(calculix::Mesh::new(&format!("brick-{edge}.inp"), &text, nodes(edge)))
+        Ok(calculix::CalculixMesh::new(&format!("brick-{edge}.inp"), &text, nodes(edge)))
     }
 
     /// Largest difference to ours at a node, K.

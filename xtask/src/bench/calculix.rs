@@ -16,7 +16,7 @@ pub struct Calculix {
 }
 
 /// A mesh in a file that a deck includes.
-pub struct Mesh {
+pub struct CalculixMesh {
     file: String,
     nodes: u64,
     /// Element and side, from 1, of all sides but the bottom.
@@ -24,14 +24,14 @@ pub struct Mesh {
 }
 
 /// Result of a run.
-pub struct Run {
+pub struct CalculixRun {
     /// Wall time of the program, s.
     pub seconds: f64,
     /// Temperatures of all nodes after the last step, K.
     pub temperatures: Vec<f64>,
 }
 
-impl Mesh {
+impl CalculixMesh {
     /// Creates the input from a file as `crates/crystfem/benches/brick.rs` writes it.
     pub fn new(file: &str, text: &str, nodes: u64) -> Self {
         let (mut sides, mut inside) = (Vec::new(), false);
@@ -84,7 +84,7 @@ impl Calculix {
     }
 
     /// Runs a deck in `folder`, where the mesh lies, on one thread.
-    pub fn run(&self, folder: &Path, mesh: &Mesh, steps: u32, solver: &str) -> Result<Run> {
+    pub fn run(&self, folder: &Path, mesh: &CalculixMesh, steps: u32, solver: &str) -> Result<CalculixRun> {
         std::fs::write(folder.join("calculix.inp"), mesh.deck(steps, solver)).into_diagnostic()?;
         let since = Instant::now();
         let output = Command::new(&self.program)
@@ -113,7 +113,7 @@ impl Calculix {
                 mesh.nodes
             ));
         }
-        Ok(Run { seconds, temperatures })
+        Ok(CalculixRun { seconds, temperatures })
     }
 }
 
@@ -136,7 +136,7 @@ mod tests {
     #[test]
     fn decks_and_tables() {
         let text = "*NODE\n1,0,0,0\n*SURFACE,NAME=bottom,TYPE=ELEMENT\n1,S1\n*SURFACE,NAME=top,TYPE=ELEMENT\n1,S2\n7,S2\n";
-        let mesh = Mesh::new("brick.inp", text, 8);
+        let mesh = CalculixMesh::new("brick.inp", text, 8);
         let deck = mesh.deck(20, "SPOOLES");
         assert!(
             deck.contains("*FILM\n1,F2,353.15,15\n7,F2,353.15,15\n*RADIATE\n1,R2,353.15,0.9\n"),

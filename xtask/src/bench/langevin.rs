@@ -13,7 +13,7 @@ use miette::{IntoDiagnostic, Result, miette};
 use polycore::langevin::{Inverse, inverse_from_complement};
 
 use super::Row;
-use crate::table::Table;
+use crate::table::TextTable;
 
 #[path = "../../../crates/polycore/benches/langevin/arguments.rs"]
 mod arguments;
@@ -33,7 +33,7 @@ pub fn run(folder: &Path) -> Result<(Vec<Row>, String)> {
     let arguments = arguments();
     let mut rows = Vec::new();
     let mut points = Vec::new();
-    let mut table = Table::new(["inverse", "largest relative error", "published", "ns/call", "source"]);
+    let mut table = TextTable::new(["inverse", "largest relative error", "published", "ns/call", "source"]);
     for choice in Inverse::ALL {
         let (error, count) = match choice {
             Inverse::Exact => error_of_exact()?,

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
 
-use super::forces::{Difference, Snapshot, compare, contact};
+use super::forces::{ForceDifference, Snapshot, compare, contact};
 use super::lammps::{Lammps, read_forces, write_particles};
 use super::{Row, external};
-use crate::table::Table;
-use crate::workspace::Workspace;
+use crate::table::TextTable;
+use crate::workspace::Repository;
 
 /// Distance of particles (m), horizon over it, bulk modulus (Pa): those of `crates/peri/benches/block.rs`.
 const SPACING: f64 = 5e-4;
@@ -31,15 +31,15 @@ const LARGE: f64 = 0.2;
 const SAME: f64 = 1e-8;
 
 /// Rows, tables, and whether both programs solved the same problem.
-pub fn run(workspace: &Workspace, folder: &Path) -> Result<(Vec<Row>, String, bool)> {
+pub fn run(workspace: &Repository, folder: &Path) -> Result<(Vec<Row>, String, bool)> {
     let mut peers = Peers {
         lammps: Lammps::find(workspace)?,
         peri: workspace.bench("peri")?,
         folder: folder.join("peri-peers"),
         rows: Vec::new(),
         same: true,
-        forces: Table::new(["forces", "particles", "max |Δf|/rms f", "at cell", "differing", "why"]),
-        rates: Table::new([
+        forces: TextTable::new(["forces", "particles", "max |Δf|/rms f", "at cell", "differing", "why"]),
+        rates: TextTable::new([
             "particles",
             "threads",
             "steps",
@@ -85,12 +85,12 @@ struct Peers {
     folder: PathBuf,
     rows: Vec<Row>,
     same: bool,
-    forces: Table<6>,
-    rates: Table<8>,
+    forces: TextTable<6>,
+    rates: TextTable<8>,
 }
 
 /// Expected relation of two sets of forces.
-enum Claim {
+enum Expectation {
     /// Equal up to rounding and the fitted law.
     Same,
     /// Different, for this reason.
@@ -106,22 +106,22 @@ impl Peers {
         };
         let partial = self.start(cells, SMALL)?;
         let lammps = run(self)?;
-        self.judge("partial volumes", &partial, &lammps, Claim::Same)?;
+        self.judge("partial volumes", &partial, &lammps, Expectation::Same)?;
         let flags = format!("{cells} --steps 0 --strain {SMALL}");
         let sharp = self.snapshot(&format!("{flags} --partial-volumes --fit-bound 1e-13"))?;
-        self.judge("partial volumes, law fitted to 1e-13", &sharp, &lammps, Claim::Same)?;
+        self.judge("partial volumes, law fitted to 1e-13", &sharp, &lammps, Expectation::Same)?;
         let full = self.snapshot(&flags)?;
         let why = "LAMMPS always scales volumes within Δx/2 of the horizon: 0.69 V at 2√2 Δx, 0.52 V at 3 Δx";
-        self.judge("full volumes (our default)", &full, &lammps, Claim::Differ(why))?;
+        self.judge("full volumes (our default)", &full, &lammps, Expectation::Differ(why))?;
         let mut touching = self.start(cells, LARGE)?;
         let lammps = run(self)?;
         let why = "LAMMPS' contact force, never off: pairs nearer than min(0.9 |ξ|, 1.35 Δx)";
-        self.judge("partial volumes, strain 0.2", &touching, &lammps, Claim::Differ(why))?;
+        self.judge("partial volumes, strain 0.2", &touching, &lammps, Expectation::Differ(why))?;
         let push = contact(&touching, SPACING, RATIO * SPACING, BULK_MODULUS);
         for (force, push) in touching.forces.iter_mut().zip(push) {
             *force = [force[0] + push[0], force[1] + push[1], force[2] + push[2]];
         }
-        self.judge("the same plus contact forces", &touching, &lammps, Claim::Same)
+        self.judge("the same plus contact forces", &touching, &lammps, Expectation::Same)
     }
 
     /// Alternating runs; gives LAMMPS' version and leaves its last forces for [`Self::after_steps`].
@@ -174,7 +174,7 @@ impl Peers {
     fn after_steps(&mut self, cells: u16, steps: u32) -> Result<()> {
         let ours = self.snapshot(&format!("{cells} --steps {steps} --strain {SMALL} --partial-volumes"))?;
         let lammps = read_forces(&self.folder)?;
-        self.judge(&format!("partial volumes, after {steps} steps"), &ours, &lammps, Claim::Same)
+        self.judge(&format!("partial volumes, after {steps} steps"), &ours, &lammps, Expectation::Same)
     }
 
     /// The initial displacement with its forces, also given to LAMMPS.
@@ -195,17 +195,17 @@ impl Peers {
     }
 
     /// Compares the forces of `state` with LAMMPS'; a row of their table.
-    fn judge(&mut self, what: &str, state: &Snapshot, lammps: &[[f64; 3]], claim: Claim) -> Result<()> {
-        let Some(Difference { largest, at, differing }) = compare(&state.forces, lammps) else {
+    fn judge(&mut self, what: &str, state: &Snapshot, lammps: &[[f64; 3]], claim: Expectation) -> Result<()> {
+        let Some(ForceDifference { largest, at, differing }) = compare(&state.forces, lammps) else {
             return Err(miette!("{what}: {} and {} forces, or all zero", state.forces.len(), lammps.len()));
         };
         let same = largest <= SAME;
         let why = match claim {
-            Claim::Same if same => "rounding and the fitted law".to_owned(),
-            Claim::Same => format!("UNKNOWN: at most {SAME:e} was expected"),
-            Claim::Differ(why) => why.to_owned(),
+            Expectation::Same if same => "rounding and the fitted law".to_owned(),
+            Expectation::Same => format!("UNKNOWN: at most {SAME:e} was expected"),
+            Expectation::Differ(why) => why.to_owned(),
         };
-        self.same &= same || matches!(claim, Claim::Differ(_));
+        self.same &= same || matches!(claim, Expectation::Differ(_));
         let count = lammps.len();
         self.forces.push([
             what.to_owned(),

@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
 use serde::Deserialize;
 
-use crate::workspace::Workspace;
+use crate::workspace::Repository;
 
 /// Names another virtual environment than target/venv-scikit-fem.
 const VARIABLE: &str = "SCIKIT_FEM_VENV";
@@ -18,7 +18,7 @@ pub struct ScikitFem {
 
 /// Numbers that brick.py prints; temperatures are in scikit-fem.csv.
 #[derive(Deserialize)]
-pub struct Figures {
+pub struct BrickFigures {
     /// Seconds for the constant matrices.
     pub set_up: f64,
     /// Seconds for all steps.
@@ -35,7 +35,7 @@ impl ScikitFem {
     ///
     /// # Errors
     /// Where a folder cannot be looked into.
-    pub fn find(workspace: &Workspace) -> Result<Result<Self, String>> {
+    pub fn find(workspace: &Repository) -> Result<Result<Self, String>> {
         let folder = std::env::var_os(VARIABLE)
             .map_or_else(|| workspace.target().join("venv-scikit-fem"), PathBuf::from);
         let python = folder.join("bin/python");
@@ -59,7 +59,7 @@ impl ScikitFem {
     ///
     /// # Errors
     /// Where it fails.
-    pub fn run(&self, folder: &Path, mesh: &Path, steps: u32) -> Result<Figures> {
+    pub fn run(&self, folder: &Path, mesh: &Path, steps: u32) -> Result<BrickFigures> {
         std::fs::write(folder.join("brick.py"), include_str!("brick.py")).into_diagnostic()?;
         let mut command = Command::new(&self.python);
         command.arg("brick.py").arg(mesh).arg(steps.to_string()).arg("scikit-fem.csv").current_dir(folder);

@@ -9,7 +9,7 @@ use miette::{IntoDiagnostic, Result, WrapErr, miette};
 use polycore::file::atomic_write;
 
 use super::{Row, external};
-use crate::workspace::Workspace;
+use crate::workspace::Repository;
 
 const TRAINING: &str = include_str!("torch_training.py");
 const ANSWERS: &str = include_str!("surrogate_peers.py");
@@ -21,8 +21,8 @@ const CASE: &str = "cases/ch3/train-default/case.toml";
 const POINTS: usize = 512;
 
 /// Rows; what a peer cannot measure here is named in a row without a value.
-pub fn run(workspace: &Workspace, folder: &Path) -> Result<Vec<Row>> {
-    let program = workspace.release("mdsurrogate")?;
+pub fn run(workspace: &Repository, folder: &Path) -> Result<Vec<Row>> {
+    let program = workspace.build_program("mdsurrogate")?;
     let bench = workspace.bench("mdsurrogate")?;
     let mut rows = external(&bench, &[])?;
     rows.extend(external(&bench, &["--training".to_owned()])?);

@@ -5,8 +5,8 @@ use std::fs;
 use miette::{IntoDiagnostic, Result, WrapErr};
 use serde::{Deserialize, Serialize};
 
-use super::evidence::{Finding, Found, Measured, Number, check, verdict};
-use crate::workspace::Workspace;
+use super::evidence::{CaseNumber, MeasuredNumbers, NumberRow, TestNumber, check, verdict};
+use crate::workspace::Repository;
 
 /// Proof of an erratum.
 #[derive(Debug, Deserialize)]
@@ -18,10 +18,10 @@ pub struct Proof {
     pub case: Option<String>,
     /// Quantities that a case expects.
     #[serde(default)]
-    pub numbers: Vec<Number>,
+    pub numbers: Vec<CaseNumber>,
     /// Numbers that tests measure.
     #[serde(default)]
-    pub tests: Vec<Measured>,
+    pub tests: Vec<TestNumber>,
 }
 
 /// A row of docs/errata.md.
@@ -32,20 +32,20 @@ pub struct Erratum {
 
 /// A row with its numbers.
 #[derive(Serialize)]
-pub struct Proven {
+pub struct ErratumVerdict {
     chapter: String,
     place: String,
     wrong: String,
     ours: String,
     test: String,
-    findings: Vec<Finding>,
+    findings: Vec<NumberRow>,
     verdict: &'static str,
     tone: &'static str,
 }
 
 impl Erratum {
     /// All rows of docs/errata.md.
-    pub fn read(workspace: &Workspace) -> Result<Vec<Self>> {
+    pub fn read(workspace: &Repository) -> Result<Vec<Self>> {
         let text = fs::read_to_string(workspace.root().join("docs/errata.md"));
         Ok(parse(&text.into_diagnostic().wrap_err("docs/errata.md")?))
     }
@@ -92,7 +92,7 @@ fn cells(line: &str) -> Vec<String> {
 }
 
 /// Checks docs/errata.md against the proofs.
-pub fn faults(workspace: &Workspace, rows: &[Erratum], proofs: &[Proof]) -> Vec<String> {
+pub fn faults(workspace: &Repository, rows: &[Erratum], proofs: &[Proof]) -> Vec<String> {
     let mut faults = Vec::new();
     for row in rows {
         let count = proofs.iter().filter(|proof| row.is(proof)).count();
@@ -114,7 +114,7 @@ pub fn faults(workspace: &Workspace, rows: &[Erratum], proofs: &[Proof]) -> Vec<
 }
 
 /// Looks the numbers up.
-pub fn judge(rows: &[Erratum], proofs: &[Proof], found: &Found) -> Vec<Proven> {
+pub fn judge(rows: &[Erratum], proofs: &[Proof], found: &MeasuredNumbers) -> Vec<ErratumVerdict> {
     let judged = |row: &Erratum| {
         let proof = proofs.iter().find(|proof| row.is(proof));
         let findings = proof.map_or_else(Vec::new, |proof| {
@@ -123,7 +123,7 @@ pub fn judge(rows: &[Erratum], proofs: &[Proof], found: &Found) -> Vec<Proven> {
         let (verdict, tone) = verdict(&findings).unwrap_or(("proven", "good"));
         let [place, wrong, ours, test] =
             row.cells.clone().map(|cell| cell.replace('`', "").replace("**", ""));
-        Proven { chapter: row.chapter.clone(), place, wrong, ours, test, findings, verdict, tone }
+        ErratumVerdict { chapter: row.chapter.clone(), place, wrong, ours, test, findings, verdict, tone }
     };
     rows.iter().map(judged).collect()
 }

@@ -9,14 +9,14 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use serde::Serialize;
 
-use crate::outcome::Outcome;
+use crate::outcome::CaseOutcome;
 
 /// Pixels across of the widest picture; pages are about 900 wide, and pictures of finer screens gain little.
 const WIDTH: u32 = 1100;
 
 /// A picture with what leads to it.
 #[derive(Clone, Serialize)]
-pub struct Picture {
+pub struct ReportPicture {
     /// `data:image/png;base64,…`.
     pub data: String,
     /// The file's name in words.
@@ -39,11 +39,11 @@ pub struct Gallery {
 
 impl Gallery {
     /// The picture `name` among an outcome's results; none where there is no such file.
-    pub fn picture(&mut self, outcome: &Outcome, name: &str) -> Option<Picture> {
+    pub fn picture(&mut self, outcome: &CaseOutcome, name: &str) -> Option<ReportPicture> {
         let path = outcome.output.join(name);
         let data = embed(&path)?;
         self.shown.insert(path);
-        Some(Picture {
+        Some(ReportPicture {
             data,
             caption: words(name),
             case: outcome.case.clone(),
@@ -54,7 +54,7 @@ impl Gallery {
     }
 
     /// Up to `most` pictures among an outcome's results that stand nowhere yet.
-    pub fn rest(&mut self, outcome: &Outcome, most: usize) -> Vec<Picture> {
+    pub fn rest(&mut self, outcome: &CaseOutcome, most: usize) -> Vec<ReportPicture> {
         let mut names = names(&outcome.output);
         names.retain(|name| !self.shown.contains(&outcome.output.join(name)));
         names.iter().take(most).filter_map(|name| self.picture(outcome, name)).collect()

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use harness::report::Value;
 
 use crate::bench::Row;
-use crate::outcome::Outcome;
+use crate::outcome::CaseOutcome;
 
 /// Rows of errors with the rows of times of the same point, of the largest size that has both: name, time, error.
 pub fn pairs(rows: &[Row], error: &str, time: &str) -> Vec<(String, f64, f64)> {
@@ -39,7 +39,7 @@ pub fn pairs(rows: &[Row], error: &str, time: &str) -> Vec<(String, f64, f64)> {
 }
 
 /// Rows `NAME,…` with numbers in two columns.
-pub fn of_table(text: &str, error: usize, time: usize, scale: f64) -> Vec<(String, f64, f64)> {
+pub fn read_table_points(text: &str, error: usize, time: usize, scale: f64) -> Vec<(String, f64, f64)> {
     let point = |line: &str| {
         let cells: Vec<&str> = line.split(',').collect();
         let number = |k: usize| cells.get(k)?.trim().parse::<f64>().ok();
@@ -49,7 +49,7 @@ pub fn of_table(text: &str, error: usize, time: usize, scale: f64) -> Vec<(Strin
 }
 
 /// Every point of every curve whose name begins so.
-pub fn of_curves(outcome: &Outcome, prefix: &str) -> Vec<(String, f64, f64)> {
+pub fn read_curve_points(outcome: &CaseOutcome, prefix: &str) -> Vec<(String, f64, f64)> {
     let values = outcome.report.iter().flat_map(|report| &report.values);
     let mut points = Vec::new();
     for (name, value) in values {
@@ -92,9 +92,9 @@ mod tests {
     fn rows_of_a_table() {
         let text = "law,error,training [s],one stress [s]\nenergy,2.5,30,1e-6\nANN-4,3,nothing,2e-6\n";
         assert_eq!(
-            of_table(text, 1, 3, 1e6),
+            read_table_points(text, 1, 3, 1e6),
             [("energy".to_owned(), 1.0, 2.5), ("ANN-4".to_owned(), 2.0, 3.0)]
         );
-        assert_eq!(of_table(text, 1, 2, 1.0), [("energy".to_owned(), 30.0, 2.5)]);
+        assert_eq!(read_table_points(text, 1, 2, 1.0), [("energy".to_owned(), 30.0, 2.5)]);
     }
 }

@@ -6,9 +6,9 @@ use std::fs;
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
 use serde::{Deserialize, Serialize};
 
-use super::evidence::{Finding, Found, Measured, Number, check, verdict};
-use super::pictures::{Gallery, Picture};
-use crate::workspace::Workspace;
+use super::evidence::{CaseNumber, MeasuredNumbers, NumberRow, TestNumber, check, verdict};
+use super::pictures::{Gallery, ReportPicture};
+use crate::workspace::Repository;
 
 /// Items that must have a row (issue 6): figures and tables with a result, and the appendices.
 pub const NUMBERED: &[&str] = &[
@@ -50,12 +50,12 @@ pub const NUMBERED: &[&str] = &[
 /// The file.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Map {
+pub struct ThesisMap {
     /// Rows in the order of the thesis.
-    pub row: Vec<Row>,
+    pub row: Vec<ThesisRow>,
     /// Transfers from one program to another.
     #[serde(default)]
-    pub link: Vec<Row>,
+    pub link: Vec<ThesisRow>,
     /// Numbers that prove the rows of docs/errata.md.
     pub erratum: Vec<super::errata::Proof>,
 }
@@ -63,7 +63,7 @@ pub struct Map {
 /// A figure or table, or a link between scales.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Row {
+pub struct ThesisRow {
     /// `Fig. 2.7`, `Print to stress`.
     pub number: String,
     /// Title of the row.
@@ -80,10 +80,10 @@ pub struct Row {
     pub case: Option<String>,
     /// Quantities that the case expects.
     #[serde(default)]
-    pub numbers: Vec<Number>,
+    pub numbers: Vec<CaseNumber>,
     /// Numbers that tests measure.
     #[serde(default)]
-    pub tests: Vec<Measured>,
+    pub tests: Vec<TestNumber>,
     /// Pictures among the case's results; of each group the first that exists is shown.
     #[serde(default)]
     pub pictures: Vec<Vec<String>>,
@@ -107,7 +107,7 @@ pub enum Verdict {
 
 /// A row with what was found.
 #[derive(Serialize)]
-pub struct Judged {
+pub struct RowVerdict {
     number: String,
     title: String,
     shows: String,
@@ -117,14 +117,14 @@ pub struct Judged {
     verdict: &'static str,
     /// Class on the page: `good`, `fair`, `bad`, `open`.
     tone: &'static str,
-    findings: Vec<Finding>,
+    findings: Vec<NumberRow>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pictures: Vec<Picture>,
+    pictures: Vec<ReportPicture>,
     case: Option<String>,
     anchor: String,
 }
 
-impl Judged {
+impl RowVerdict {
     /// Cells of the row in docs/validation.md.
     pub fn cells(&self) -> [String; 4] {
         let numbers: Vec<String> = self.findings.iter().map(|f| format!("{}: {}", f.what, f.value)).collect();
@@ -144,16 +144,16 @@ impl Judged {
     }
 }
 
-impl Map {
+impl ThesisMap {
     /// Reads cases/thesis.toml.
-    pub fn read(workspace: &Workspace) -> Result<Self> {
+    pub fn read(workspace: &Repository) -> Result<Self> {
         let path = workspace.root().join("cases/thesis.toml");
         let text = fs::read_to_string(&path).into_diagnostic().wrap_err("cases/thesis.toml")?;
         toml::from_str(&text).map_err(|error| miette!("cases/thesis.toml: {error}"))
     }
 
     /// Every row is there once and rests on something that exists; the list of what is wrong.
-    pub fn faults(&self, workspace: &Workspace) -> Vec<String> {
+    pub fn faults(&self, workspace: &Repository) -> Vec<String> {
         let mut faults = Vec::new();
         let mut seen = BTreeSet::new();
         for row in self.row.iter().chain(&self.link) {
@@ -182,13 +182,13 @@ impl Map {
     }
 
     /// Looks everything up: figures and tables, and links.
-    pub fn judge(&self, found: &Found, gallery: &mut Gallery) -> [Vec<Judged>; 2] {
+    pub fn judge(&self, found: &MeasuredNumbers, gallery: &mut Gallery) -> [Vec<RowVerdict>; 2] {
         [&self.row, &self.link].map(|rows| rows.iter().map(|row| row.judge(found, gallery)).collect())
     }
 }
 
-impl Row {
-    fn judge(&self, found: &Found, gallery: &mut Gallery) -> Judged {
+impl ThesisRow {
+    fn judge(&self, found: &MeasuredNumbers, gallery: &mut Gallery) -> RowVerdict {
         let findings = found.findings(self.case.as_deref(), &self.numbers, &self.tests);
         let (verdict, tone) = match (self.verdict, verdict(&findings)) {
             (_, Some(failed @ ("failed", _))) => failed,
@@ -204,7 +204,7 @@ impl Row {
             let outcome = outcome?;
             group.iter().find_map(|name| gallery.picture(outcome, name))
         };
-        Judged {
+        RowVerdict {
             pictures: self.pictures.iter().filter_map(shown).collect(),
             number: self.number.clone(),
             title: self.title.clone(),
@@ -224,14 +224,14 @@ impl Row {
 mod tests {
     use super::*;
 
-    fn workspace() -> Workspace {
-        Workspace::new(std::path::PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(".."))
+    fn workspace() -> Repository {
+        Repository::new(std::path::PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(".."))
     }
 
     /// Every figure and table has a row, and every row a quantity that a case expects or a test that says so.
     #[test]
     fn the_map_is_whole() {
-        let map = Map::read(&workspace()).expect("cases/thesis.toml");
+        let map = ThesisMap::read(&workspace()).expect("cases/thesis.toml");
         let faults = map.faults(&workspace());
         assert!(faults.is_empty(), "{}", faults.join("\n"));
         let errata = super::super::errata::Erratum::read(&workspace()).expect("docs/errata.md");
@@ -244,7 +244,7 @@ mod tests {
     fn faults_are_found() {
         let row = |text: &str| {
             let head = "erratum = []\n[[row]]\nnumber = 'Fig. 2.7'\ntitle = 't'\nshows = 's'\nours = 'o'\n";
-            let map: Map = toml::from_str(&format!("{head}{text}")).expect("a map");
+            let map: ThesisMap = toml::from_str(&format!("{head}{text}")).expect("a map");
             map.faults(&workspace())
                 .into_iter()
                 .filter(|fault| fault.starts_with("Fig. 2.7:"))
@@ -262,7 +262,7 @@ mod tests {
     #[test]
     fn regressions_are_no_evidence() {
         let root = tempfile::tempdir().expect("a folder");
-        let workspace = Workspace::new(root.path().to_path_buf());
+        let workspace = Repository::new(root.path().to_path_buf());
         fs::create_dir_all(root.path().join("cases/c")).expect("a folder");
         let faults = |kinds: &[&str]| {
             let expect = |kind: &&str| {
@@ -270,7 +270,7 @@ mod tests {
             };
             let text: String = kinds.iter().map(expect).collect();
             fs::write(root.path().join("cases/c/case.toml"), text).expect("a case");
-            let number: Number = toml::from_str("quantity = 'q'\nwhat = 'w'").expect("a number");
+            let number: CaseNumber = toml::from_str("quantity = 'q'\nwhat = 'w'").expect("a number");
             let mut faults = Vec::new();
             check(&workspace, Some("c"), &[number], &[], &mut |text| faults.push(text));
             faults

@@ -12,7 +12,7 @@ pub use onnx::{OnnxOptions, onnx};
 
 use crate::Error;
 use crate::network::{Activation, LANES, Network};
-use crate::surrogate::{Coefficients, Header, Invariants, Surrogate, Symmetry, derivative};
+use crate::surrogate::{Coefficients, Header, Surrogate, Symmetry, SymmetryInvariants, derivative};
 
 /// A model and its numbers.
 struct Model<'a> {
@@ -30,7 +30,7 @@ struct Description {
     widest: usize,
     parameters: usize,
     energetic: bool,
-    invariants: Invariants,
+    invariants: SymmetryInvariants,
     widths: Vec<usize>,
     /// Places in [`Activation::ALL`].
     activations: Vec<usize>,
@@ -63,8 +63,8 @@ impl<'a> Model<'a> {
     }
 
     /// Those of an energy; the inputs of an `ann` are the components of C.
-    fn invariants(&self) -> Invariants {
-        self.header.kind.invariants().unwrap_or(Invariants::new(Symmetry::Triclinic, false, false))
+    fn invariants(&self) -> SymmetryInvariants {
+        self.header.kind.invariants().unwrap_or(SymmetryInvariants::new(Symmetry::Triclinic, false, false))
     }
 
     fn description(&self) -> Description {

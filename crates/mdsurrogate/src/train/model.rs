@@ -4,7 +4,7 @@ use super::dataset::{Batch, scaled_slopes, units};
 use super::parameters::Layout;
 use crate::Error;
 use crate::network::Activation;
-use crate::surrogate::{Invariants, Kind, StressAtRest, Surrogate, Symmetry};
+use crate::surrogate::{Kind, StressAtRest, Surrogate, Symmetry, SymmetryInvariants};
 use burn::tensor::{Device, Tensor, TensorData, activation};
 use polycore::tensor::Voigt;
 
@@ -51,7 +51,7 @@ struct Polyconvex {
 
 impl Polyconvex {
     /// In units in which the energy is Σ_k weight_k x_k.
-    fn new(law: &Surrogate<f64>, symmetry: Symmetry, invariants: Invariants) -> Self {
+    fn new(law: &Surrogate<f64>, symmetry: Symmetry, invariants: SymmetryInvariants) -> Self {
         let inputs = invariants.count();
         let StressAtRest { spherical, along } = symmetry.stress_at_rest();
         let identity = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0];

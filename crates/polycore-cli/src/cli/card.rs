@@ -7,7 +7,7 @@ use polycore::Error;
 use polycore::file::atomic_write;
 
 use super::material::{BULK_RATIO, unusable};
-use super::set::Set;
+use super::table_fits::TableFits;
 
 /// Files by units: their name, what they say of it, and the host's unit of stress, Pa.
 const FILES: [(&str, &str, f64); 2] =
@@ -17,7 +17,7 @@ const FILES: [(&str, &str, f64); 2] =
 ///
 /// # Errors
 /// A file that cannot be written.
-pub fn write(directory: &Path, all: &[Set]) -> Result<(), Error> {
+pub fn write(directory: &Path, all: &[TableFits]) -> Result<(), Error> {
     for (name, units, pascals) in FILES {
         atomic_write(directory.join(name), |file| {
             writeln!(

@@ -17,7 +17,7 @@ pub struct Arguments {
     parameters: Vec<String>,
     /// The test.
     #[arg(long, value_enum, default_value = "uniaxial")]
-    mode: Mode,
+    mode: StretchMode,
     /// First stretch.
     #[arg(long, default_value_t = 1.0)]
     from: f64,
@@ -30,7 +30,7 @@ pub struct Arguments {
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
-enum Mode {
+enum StretchMode {
     Uniaxial,
     Equibiaxial,
     PureShear,
@@ -44,12 +44,12 @@ pub fn table(arguments: &Arguments) -> Result<String, String> {
         let share = f64::from(i) / f64::from(arguments.points.max(2) - 1);
         let l = arguments.from + share * (arguments.to - arguments.from);
         let other = match arguments.mode {
-            Mode::Uniaxial => l.recip().sqrt(),
-            Mode::Equibiaxial => l,
-            Mode::PureShear => 1.0,
+            StretchMode::Uniaxial => l.recip().sqrt(),
+            StretchMode::Equibiaxial => l,
+            StretchMode::PureShear => 1.0,
         };
         let mut nominal = homogeneous::biaxial(&law, l, other).map_err(|error| error.to_string())?;
-        if matches!(arguments.mode, Mode::Uniaxial) {
+        if matches!(arguments.mode, StretchMode::Uniaxial) {
             nominal[1] = 0.0; // but for the rounding of λ^{−1/2}
         }
         let _ = writeln!(text, "{l},{other},{},{}", nominal[0] / MPA, nominal[1] / MPA);

@@ -17,24 +17,25 @@ use polycore::constitutive::hyperelastic::{Hyperelastic, homogeneous, stability}
 use super::MPA;
 use super::material::{DIGITS, digits};
 use super::quantities as q;
-use super::scene::{Case, DataSet};
-use super::set::{Set, unit_of};
+use super::scene::{DataSet, FitCase};
+use super::table_fits::{TableFits, unit_of};
 use super::{card, draw, material, trials};
 
 /// Fits every law to every table, writes tables and pictures. A law that cannot be fitted is named; the others are kept. Where it is
 /// stopped, what is done is written.
-pub fn run(case: &Case, run: &mut Run) -> Result<Finished, Error> {
+pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
     let (directory, quick) = (run.options.output, run.options.quick);
     run.begin()?;
     let mut report = Report::new("polycore", env!("CARGO_PKG_VERSION"), &case.source.text);
     let mut phases = Phases::new();
-    let mut all: Vec<Set> = Vec::new();
+    let mut all: Vec<TableFits> = Vec::new();
     let total = (case.data.len() * case.laws.len()).max(1) as f64;
     let mut done = 0.0;
     let mut stopped = false;
     for DataSet { name, table, read } in &case.data {
         phases.start("fit");
-        let mut set = Set { name, table, read, fits: Vec::new(), failed: Vec::new(), crossed: Vec::new() };
+        let mut set =
+            TableFits { name, table, read, fits: Vec::new(), failed: Vec::new(), crossed: Vec::new() };
         for model in &case.laws {
             run.show(done / total, &|| format!("fit {name}  {}", model.key));
             match fit_until(model, table, run.options.interrupted) {
@@ -160,7 +161,7 @@ fn unstable(fit: &Fit, table: &TestData) -> Option<(Mode, f64)> {
 }
 
 /// `fits.csv`: one line for each number, with its standard error where the data determine it; stresses of a table in one unit.
-fn write_fits(directory: &Path, all: &[Set]) -> Result<(), Error> {
+fn write_fits(directory: &Path, all: &[TableFits]) -> Result<(), Error> {
     let mut text = String::from("data,law,quantity,value,standard_error,unit\n");
     for set in all {
         let (in_unit, pascals) = set.unit();
@@ -237,7 +238,7 @@ fn write_states(directory: &Path, name: &str, table: &TestData, fits: &[Fit]) ->
 }
 
 /// Summary of a run: layout of the files, rms by law and table, verdicts, parameters, a material block for `peri`, trials, then the expectations.
-fn summary(case: &Case, all: &[Set], report: &Report) -> String {
+fn summary(case: &FitCase, all: &[TableFits], report: &Report) -> String {
     let mut text = format!("{}\n", case.title);
     for set in all {
         set.read.iter().for_each(|line| text += &format!("{}: {line}\n", set.name));
@@ -296,7 +297,7 @@ fn summary(case: &Case, all: &[Set], report: &Report) -> String {
 const SAFE: f64 = 0.9;
 
 /// R² of each law in its table and in the others, whether it may be used there, and where it is unstable.
-fn verdicts(set: &Set) -> String {
+fn verdicts(set: &TableFits) -> String {
     let [low, high] = stability::range(set.table);
     let mut text = format!(
         "R² of laws fitted to {}; stability (Drucker) in uniaxial, equibiaxial and pure shear tests at stretches {low:.3} to \

@@ -8,7 +8,7 @@ use polycore::Error;
 use polycore::constitutive::hyperelastic::fit::{Fit, FittedParameter, Identifiability};
 use polycore::file::atomic_write;
 
-use super::set::{Set, unit_of};
+use super::table_fits::{TableFits, unit_of};
 
 /// Laws of which the printed block is taken before others.
 const EIGHT_CHAINS: &str = "eight-chain";
@@ -94,7 +94,7 @@ pub fn best(data: &str, fits: &[Fit]) -> String {
 }
 
 /// `materials.toml`: the block of every fit, under comments.
-pub fn write(directory: &Path, all: &[Set]) -> Result<(), Error> {
+pub fn write(directory: &Path, all: &[TableFits]) -> Result<(), Error> {
     atomic_write(directory.join("materials.toml"), |file| {
         writeln!(file, "# Take one block: docs/guide/src/how-to/fit.md says what it can and cannot do.")?;
         for set in all {

@@ -13,7 +13,7 @@ use polycore::constitutive::hyperelastic::{
 use serde::Deserialize;
 
 use super::quantities as q;
-use super::trials::Trial;
+use super::trials::TrialSpec;
 
 /// The file as written.
 #[derive(Deserialize, schemars::JsonSchema)]
@@ -27,10 +27,10 @@ struct Scene {
     title: String,
     /// Fits.
     #[serde(default)]
-    fit: Fit,
+    fit: FitSpec,
     /// Laws at single states and fits to a few, with their expected behaviour.
     #[serde(default)]
-    trial: Vec<Trial>,
+    trial: Vec<TrialSpec>,
     /// Expected results.
     #[serde(default)]
     expect: Vec<Expect>,
@@ -46,7 +46,7 @@ enum Program {
 /// Laws and data to fit.
 #[derive(Default, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-struct Fit {
+struct FitSpec {
     /// Names of laws; all of them if not given.
     laws: Option<Vec<String>>,
     /// Judge a law fitted to one table on the other tables, too.
@@ -54,13 +54,13 @@ struct Fit {
     cross: bool,
     /// Tables of measurements.
     #[serde(default)]
-    data: Vec<Data>,
+    data: Vec<DataSpec>,
 }
 
 /// A table of homogeneous states.
 #[derive(Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-struct Data {
+struct DataSpec {
     /// Name in the report.
     name: String,
     /// The CSV file, relative to the scene.
@@ -93,17 +93,17 @@ pub fn schema() -> serde_json::Value {
 }
 
 /// A scene that was checked, with its data.
-pub struct Case {
+pub struct FitCase {
     pub source: Source,
     pub title: String,
     pub laws: Vec<&'static ModelDescriptor>,
     pub cross: bool,
     pub data: Vec<DataSet>,
-    pub trials: Vec<Trial>,
+    pub trials: Vec<TrialSpec>,
     pub expect: Vec<Expect>,
 }
 
-impl Case {
+impl FitCase {
     /// Parses and checks a scene and the tables that it names.
     pub fn parse(source: &Source) -> Result<Self, SceneError> {
         let Scene { _program: Program::Polycore, title, fit, trial, expect } = source.parse()?;

@@ -18,7 +18,7 @@ use super::{MPA, quantities as q};
 /// Trial: with `parameters` a law is evaluated at a `stretch`, with `data` it is fitted.
 #[derive(Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Trial {
+pub struct TrialSpec {
     /// Name in the report.
     name: String,
     /// Expected behaviour, in words.
@@ -26,7 +26,7 @@ pub struct Trial {
     /// The law's name.
     law: String,
     /// Parameters, in the order of the law.
-    parameters: Option<Vec<Number>>,
+    parameters: Option<Vec<ParameterValue>>,
     /// The test.
     #[serde(default = "uniaxial")]
     mode: Mode,
@@ -43,14 +43,14 @@ pub struct Trial {
 /// A parameter: a stress with its unit, or a number.
 #[derive(Deserialize, schemars::JsonSchema)]
 #[serde(untagged)]
-enum Number {
+enum ParameterValue {
     /// Number with its unit.
     Stress(Stress),
     /// Without.
     Plain(f64),
 }
 
-impl Number {
+impl ParameterValue {
     fn si(&self) -> f64 {
         match self {
             Self::Stress(stress) => stress.si(),
@@ -64,12 +64,12 @@ fn uniaxial() -> Mode {
 }
 
 /// Result of a trial.
-enum Seen {
+enum TrialResult {
     Stress { nominal: f64, energy: f64 },
     Fit(Box<hyperelastic::fit::Fit>),
 }
 
-impl Trial {
+impl TrialSpec {
     /// Names of the scalars that it may have.
     pub fn quantities(&self) -> Vec<String> {
         let parameters = model(&self.law).map_or(&[][..], |model| model.parameters);
@@ -79,7 +79,7 @@ impl Trial {
         fixed.chain(own).map(|quantity| quantity.name).collect()
     }
 
-    fn attempt(&self) -> Result<Seen, constitutive::Error> {
+    fn attempt(&self) -> Result<TrialResult, constitutive::Error> {
         let model = model(&self.law)?;
         if let Some(data) = &self.data {
             let state = |(stretch, nominal): &(f64, Stress)| TestState {
@@ -88,20 +88,20 @@ impl Trial {
                 nominal: [nominal.si(), 0.0],
             };
             let table = TestData { source: String::new(), states: data.iter().map(state).collect() };
-            return Ok(Seen::Fit(Box::new(fit(model, &table)?)));
+            return Ok(TrialResult::Fit(Box::new(fit(model, &table)?)));
         }
-        let values: Vec<f64> = self.parameters.iter().flatten().map(Number::si).collect();
+        let values: Vec<f64> = self.parameters.iter().flatten().map(ParameterValue::si).collect();
         let law = model.law(&values)?;
         let first = self.stretch.unwrap_or(1.0);
         let second = self.mode.second_stretch(first);
         let Some(bulk) = self.bulk else {
             let nominal = homogeneous::biaxial(&law, first, second)?[0];
             let stretches = homogeneous::incompressible(first, second)?;
-            return Ok(Seen::Stress { nominal, energy: law.energy_at(stretches)? });
+            return Ok(TrialResult::Stress { nominal, energy: law.energy_at(stretches)? });
         };
         let law = Compressible::new(law, Volumetric::Quadratic { lame: bulk.si() })?;
         let state = plane_stress(&law, &Tensor2::new(first, 0.0, 0.0, second))?;
-        Ok(Seen::Stress { nominal: first * state.stress[0], energy: law.energy(&state.deformation)? })
+        Ok(TrialResult::Stress { nominal: first * state.stress[0], energy: law.energy(&state.deformation)? })
     }
 }
 
@@ -109,7 +109,7 @@ impl Trial {
 ///
 /// # Errors
 /// What is wrong and where.
-pub fn check(source: &Source, trials: &[Trial]) -> Result<(), SceneError> {
+pub fn check(source: &Source, trials: &[TrialSpec]) -> Result<(), SceneError> {
     for (i, trial) in trials.iter().enumerate() {
         let key = |field: &str| format!("trial[{i}].{field}");
         let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
@@ -149,7 +149,7 @@ pub fn check(source: &Source, trials: &[Trial]) -> Result<(), SceneError> {
             ));
         }
         for (given, parameter) in parameters.iter().zip(model.parameters) {
-            if matches!(given, Number::Stress(_)) != (parameter.unit == "Pa") {
+            if matches!(given, ParameterValue::Stress(_)) != (parameter.unit == "Pa") {
                 let (found, allowed) = match parameter.unit {
                     "Pa" => (format!("`{}` without a unit", parameter.name), "a stress, as \"0.3 MPa\""),
                     _ => (format!("`{}` with a unit", parameter.name), "a number without unit"),
@@ -168,7 +168,7 @@ pub fn check(source: &Source, trials: &[Trial]) -> Result<(), SceneError> {
 ///
 /// # Errors
 /// Unexpected failures.
-pub fn run(trial: &Trial, report: &mut Report) -> Result<(), Error> {
+pub fn run(trial: &TrialSpec, report: &mut Report) -> Result<(), Error> {
     let of = |quantity: Quantity| quantity.of(&[&trial.name]);
     let seen = trial.attempt();
     let mut passed = true;
@@ -186,12 +186,12 @@ pub fn run(trial: &Trial, report: &mut Report) -> Result<(), Error> {
                 report.value(of(q::REFUSED), 0.0);
             }
             match seen {
-                Seen::Stress { nominal, energy } => {
+                TrialResult::Stress { nominal, energy } => {
                     report.value(of(q::NOMINAL), nominal / MPA);
                     report.value(of(q::ENERGY), energy / MPA);
                     format!("P = {:e} MPa, W = {:e} MJ/m³", nominal / MPA, energy / MPA)
                 }
-                Seen::Fit(fit) => {
+                TrialResult::Fit(fit) => {
                     report.value(of(q::RMS), fit.rms / MPA);
                     report.value(of(q::SHEAR_MODULUS), fit.law.shear_modulus() / MPA);
                     for parameter in &fit.parameters {
@@ -210,7 +210,7 @@ pub fn run(trial: &Trial, report: &mut Report) -> Result<(), Error> {
 }
 
 /// A trial fails with any expectation on it.
-pub fn judge(trials: &[Trial], report: &mut Report) {
+pub fn judge(trials: &[TrialSpec], report: &mut Report) {
     for (trial, seen) in trials.iter().zip(&mut report.trials) {
         let own = trial.quantities();
         let fails = |judged: &&Judgement| {

@@ -15,8 +15,8 @@ pub use activation::Activation;
 pub use pass::Tape;
 pub use real::Real;
 
-use packed::Packed;
-use pass::Want;
+use packed::PackedMatrix;
+use pass::PassOutput;
 
 /// Most inputs of a network whose derivatives are requested: the lanes of one row of a Jacobian.
 pub const LANES: usize = 8;
@@ -97,8 +97,8 @@ pub struct Layer<T> {
 pub struct Network<T> {
     architecture: Architecture,
     layers: Vec<Layer<T>>,
-    packed: Vec<Packed<T>>,
-    transposed: Vec<Packed<T>>,
+    packed: Vec<PackedMatrix<T>>,
+    transposed: Vec<PackedMatrix<T>>,
 }
 
 impl<T: Real> Network<T> {
@@ -132,8 +132,9 @@ impl<T: Real> Network<T> {
 
     fn packed(architecture: Architecture, layers: Vec<Layer<T>>) -> Self {
         let pairs = || architecture.widths.windows(2).zip(&layers);
-        let packed = pairs().map(|(w, layer)| Packed::new(w[0], &layer.weights, &layer.bias)).collect();
-        let transposed = pairs().map(|(w, layer)| Packed::transposed(w[0], w[1], &layer.weights)).collect();
+        let packed = pairs().map(|(w, layer)| PackedMatrix::new(w[0], &layer.weights, &layer.bias)).collect();
+        let transposed =
+            pairs().map(|(w, layer)| PackedMatrix::transposed(w[0], w[1], &layer.weights)).collect();
         Self { architecture, layers, packed, transposed }
     }
 
@@ -181,7 +182,7 @@ impl<T: Real> Network<T> {
     pub fn forward<'t>(&self, input: &[T], tape: &'t mut Tape<T>) -> &'t [T] {
         tape.fit(self);
         tape.set_input(0, input);
-        pass::run(self, Want::Points { count: 1, gradients: false }, tape);
+        pass::run(self, PassOutput::Points { count: 1, gradients: false }, tape);
         tape.output(0)
     }
 
@@ -192,10 +193,10 @@ impl<T: Real> Network<T> {
         tape.set_input(0, input);
         let mut slopes: [&[T]; LANES] = [&[]; LANES];
         if inputs > LANES {
-            pass::run(self, Want::Points { count: 1, gradients: false }, tape);
+            pass::run(self, PassOutput::Points { count: 1, gradients: false }, tape);
             return (tape.output(0), slopes);
         }
-        pass::run(self, Want::Slopes, tape);
+        pass::run(self, PassOutput::Slopes, tape);
         let tape = &*tape;
         for (b, slope) in slopes.iter_mut().enumerate().take(inputs) {
             *slope = tape.output(b + 1);
@@ -217,7 +218,7 @@ impl<T: Real> Network<T> {
         if self.architecture.widths[0] > LANES {
             return (self.forward(input, tape)[0], [T::ZERO; LANES], [[T::ZERO; LANES]; LANES]);
         }
-        let hessian = pass::run(self, Want::Curvature, tape);
+        let hessian = pass::run(self, PassOutput::Curvature, tape);
         let (value, gradient) = first_output(tape, 0);
         (value, gradient, hessian)
     }
@@ -226,7 +227,7 @@ impl<T: Real> Network<T> {
     pub fn gradient(&self, input: &[T], tape: &mut Tape<T>) -> (T, [T; LANES]) {
         tape.fit(self);
         tape.set_input(0, input);
-        pass::run(self, Want::Points { count: 1, gradients: true }, tape);
+        pass::run(self, PassOutput::Points { count: 1, gradients: true }, tape);
         first_output(tape, 0)
     }
 
@@ -263,7 +264,7 @@ impl<T: Real> Network<T> {
         for (point, input) in inputs.iter().enumerate().take(count) {
             tape.set_input(point, input);
         }
-        pass::run(self, Want::Points { count, gradients }, tape);
+        pass::run(self, PassOutput::Points { count, gradients }, tape);
         count
     }
 }

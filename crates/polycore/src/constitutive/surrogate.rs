@@ -33,7 +33,7 @@ pub use super::{Flags, Prediction, Workspace};
 pub use evaluate::Features;
 pub use examples::examples;
 pub use header::{Header, Kind};
-pub use invariants::{Invariants, derivative};
+pub use invariants::{SymmetryInvariants, derivative};
 pub use softening::{Softening, SofteningHistory};
 pub use support::Support;
 pub use symmetry::{Monomial, StressAtRest, Symmetry};
@@ -65,7 +65,7 @@ pub struct Surrogate<T: Real = f64> {
 
 /// Scratch kept between evaluations.
 #[derive(Default)]
-struct Memory<T> {
+struct SurrogateScratch<T> {
     tape: Tape<T>,
     /// Energy and ∂W/∂c, or S, of each member (and in a batch of each point of it).
     parts: Vec<(T, [T; 6])>,
@@ -195,7 +195,7 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
     /// axes, add ½|sᵢ| (aᵢ·Caᵢ − 1) for sᵢ < 0 and ½sᵢ (aᵢ·cof C aᵢ − 1) − sᵢ(J − 1) for sᵢ > 0, since
     /// 2 ∂(aᵢ·cof C aᵢ)/∂C = 2(1 − aᵢ⊗aᵢ) and 2 ∂J/∂C = 1 at I (after Linden et al. 2023,
     /// <https://doi.org/10.1016/j.jmps.2023.105363>).
-    fn rest_of(&self, m: usize, invariants: Invariants) -> RestTerm<T> {
+    fn rest_of(&self, m: usize, invariants: SymmetryInvariants) -> RestTerm<T> {
         let mut tape = Tape::default();
         let identity = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0].map(T::from_f64);
         let mut rest = RestTerm::default();

@@ -20,18 +20,18 @@ pub fn levenberg_marquardt(
     residuals: impl Fn(&DVector<f64>) -> Option<DVector<f64>>,
     jacobian: impl Fn(&DVector<f64>) -> Option<DMatrix<f64>>,
 ) -> Optimum {
-    let problem = Problem { at: start, residuals, jacobian };
+    let problem = Residuals { at: start, residuals, jacobian };
     let (problem, report) = LevenbergMarquardt::new().with_patience(patience).minimize(problem);
     Optimum { at: problem.at, objective: report.objective_function }
 }
 
-struct Problem<R, J> {
+struct Residuals<R, J> {
     at: DVector<f64>,
     residuals: R,
     jacobian: J,
 }
 
-impl<R, J> LeastSquaresProblem<f64, Dyn, Dyn> for Problem<R, J>
+impl<R, J> LeastSquaresProblem<f64, Dyn, Dyn> for Residuals<R, J>
 where
     R: Fn(&DVector<f64>) -> Option<DVector<f64>>,
     J: Fn(&DVector<f64>) -> Option<DMatrix<f64>>,

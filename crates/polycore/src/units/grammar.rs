@@ -60,7 +60,7 @@ pub(super) fn split_number(text: &str) -> Result<(f64, &str), UnitError> {
 /// Numerator and denominator factors to SI, and the dimension, of a unit expression. Kept apart because
 /// powers of ten are exact where their inverses are not. An empty text is the unit 1.
 pub(super) fn unit(unit: &str, whole: &str) -> Result<(f64, f64, Exponents), UnitError> {
-    let mut reader = Reader { rest: unit, whole, depth: 0 };
+    let mut reader = UnitParser { rest: unit, whole, depth: 0 };
     if unit.is_empty() {
         return Ok((1.0, 1.0, [0; 8]));
     }
@@ -75,21 +75,21 @@ pub(super) fn unit(unit: &str, whole: &str) -> Result<(f64, f64, Exponents), Uni
 }
 
 #[derive(Clone, Copy)]
-struct Value {
+struct UnitValue {
     numerator: f64,
     denominator: f64,
     exponents: Exponents,
 }
 
-struct Reader<'a> {
+struct UnitParser<'a> {
     rest: &'a str,
     whole: &'a str,
     depth: usize,
 }
 
-impl Reader<'_> {
-    fn expression(&mut self) -> Result<Value, UnitError> {
-        let mut value = Value { numerator: 1.0, denominator: 1.0, exponents: [0; 8] };
+impl UnitParser<'_> {
+    fn expression(&mut self) -> Result<UnitValue, UnitError> {
+        let mut value = UnitValue { numerator: 1.0, denominator: 1.0, exponents: [0; 8] };
         let mut divided = self.peek() == Some('/');
         if !divided {
             value = self.factor()?;
@@ -119,7 +119,7 @@ impl Reader<'_> {
         }
     }
 
-    fn factor(&mut self) -> Result<Value, UnitError> {
+    fn factor(&mut self) -> Result<UnitValue, UnitError> {
         let base = match self.peek() {
             Some('(') => {
                 self.depth += 1;
@@ -137,7 +137,7 @@ impl Reader<'_> {
             }
             Some('1') => {
                 self.advance();
-                Value { numerator: 1.0, denominator: 1.0, exponents: [0; 8] }
+                UnitValue { numerator: 1.0, denominator: 1.0, exponents: [0; 8] }
             }
             Some(c) if is_symbol(c) => self.symbol()?,
             Some(c) => return Err(self.problem(format!("unexpected `{c}`"))),
@@ -146,13 +146,13 @@ impl Reader<'_> {
         match self.power()? {
             1 => Ok(base),
             power => {
-                let one = Value { numerator: 1.0, denominator: 1.0, exponents: [0; 8] };
+                let one = UnitValue { numerator: 1.0, denominator: 1.0, exponents: [0; 8] };
                 self.multiply(one, base, power)
             }
         }
     }
 
-    fn symbol(&mut self) -> Result<Value, UnitError> {
+    fn symbol(&mut self) -> Result<UnitValue, UnitError> {
         let end = self.rest.find(|c| !is_symbol(c)).unwrap_or(self.rest.len());
         let (word, rest) = self.rest.split_at(end);
         if table::affine(word).is_some() {
@@ -163,7 +163,7 @@ impl Reader<'_> {
             return Err(UnitError::Unknown { unit: word.into(), text: self.whole.trim().into(), suggestion });
         };
         self.rest = rest;
-        Ok(Value { numerator, denominator, exponents })
+        Ok(UnitValue { numerator, denominator, exponents })
     }
 
     /// The power after a symbol or bracket; 1 if there is none.
@@ -197,7 +197,7 @@ impl Reader<'_> {
         }
     }
 
-    fn multiply(&self, a: Value, b: Value, power: i32) -> Result<Value, UnitError> {
+    fn multiply(&self, a: UnitValue, b: UnitValue, power: i32) -> Result<UnitValue, UnitError> {
         let (up, down) = if power > 0 { (b.numerator, b.denominator) } else { (b.denominator, b.numerator) };
         let size = power.abs();
         let mut exponents = a.exponents;
@@ -208,7 +208,7 @@ impl Reader<'_> {
             }
             *sum = wide as i8;
         }
-        Ok(Value {
+        Ok(UnitValue {
             numerator: a.numerator * up.powi(size),
             denominator: a.denominator * down.powi(size),
             exponents,

@@ -5,13 +5,13 @@ use std::sync::LazyLock;
 
 use super::{Exponents, exponents};
 
-type Table = HashMap<&'static str, ([f64; 2], Exponents)>;
+type UnitTable = HashMap<&'static str, ([f64; 2], Exponents)>;
 
 /// Longer symbols are historical curiosities (`libra`, `congius`) that would only spoil the suggestions.
 const LONGEST_SYMBOL: usize = 4;
 
-static TABLE: LazyLock<Table> = LazyLock::new(|| {
-    let mut table = Table::new();
+static TABLE: LazyLock<UnitTable> = LazyLock::new(|| {
+    let mut table = UnitTable::new();
     macro_rules! add {
         ($($quantity:ident, $type:ident, $exponents:expr;)+) => {$(
             for unit in uom::si::$quantity::units() {

@@ -1,6 +1,8 @@
 //! Langevin chain networks: three chains, eight chains, and eight chains with a √I₂ term.
 
-use super::descriptor::{ABSENT, Contained, Domain, ModelDescriptor, ModelKind, Parameter, Start, UNLIMITED};
+use super::descriptor::{
+    ABSENT, Contained, Domain, FitStart, ModelDescriptor, ModelKind, Parameter, UNLIMITED,
+};
 use super::polynomial::{first_invariant_excess, second_invariant_excess};
 use super::principal::InvariantDerivatives;
 use super::{Error, Hyperelastic, PrincipalResponse, finite, parameter, positive};
@@ -81,7 +83,7 @@ pub(super) const EIGHT_CHAIN_ROOT_I2: ModelDescriptor = ModelDescriptor {
 const UNLOCKED: Contained =
     Contained { key: "neo-hookean", embed: |p, start| vec![vec![p[0], UNLIMITED * start.limits[1]]] };
 
-fn starts(start: &Start<'_>) -> Vec<Vec<f64>> {
+fn starts(start: &FitStart<'_>) -> Vec<Vec<f64>> {
     [1.02, 1.3, 3.0].map(|r| vec![0.8 * start.modulus, r * start.limits[1]]).to_vec()
 }
 

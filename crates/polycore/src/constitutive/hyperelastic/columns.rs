@@ -32,7 +32,7 @@ pub enum TestStressMeasure {
 /// Role of a column, read from its heading.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Role {
-    pub what: What,
+    pub what: ColumnKind,
     /// Index of the axis: 0 for `stretch_1`, 1 for `stretch_2`.
     pub axis: Option<usize>,
     /// The axis is a number, which may also be that of a specimen.
@@ -44,7 +44,7 @@ pub(super) struct Role {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum What {
+pub(super) enum ColumnKind {
     /// A strain, of which the heading may name the measure.
     Strain(Option<StrainMeasure>),
     /// A stress, of which the heading may name the measure.
@@ -111,25 +111,25 @@ impl Role {
         let what = if has(&OTHERS) {
             return None;
         } else if MODES.contains(&plain.as_str()) {
-            What::Mode
+            ColumnKind::Mode
         } else if has(&STRETCHES) {
-            What::Strain(Some(StrainMeasure::Stretch))
+            ColumnKind::Strain(Some(StrainMeasure::Stretch))
         } else if has(&STRAINS) || lengthened {
             let measure = match (has(&TRUE), has(&NOMINAL) || lengthened) {
                 (true, _) => Some(StrainMeasure::True),
                 (_, true) => Some(StrainMeasure::Engineering),
                 _ => None,
             };
-            What::Strain(measure)
+            ColumnKind::Strain(measure)
         } else if has(&STRESSES) {
             let measure = match (has(&TRUE), has(&NOMINAL)) {
                 (true, _) => Some(TestStressMeasure::True),
                 (_, true) => Some(TestStressMeasure::Nominal),
                 _ => None,
             };
-            What::Stress(measure)
+            ColumnKind::Stress(measure)
         } else if has(&FORCES) || has(&LENGTHENINGS) {
-            What::Raw
+            ColumnKind::Raw
         } else {
             return None;
         };

@@ -19,7 +19,7 @@ pub struct ModelDescriptor {
     /// Plausible values for a rubber.
     pub example: &'static [f64],
     /// Starting points of fits.
-    pub(super) starts: fn(&Start<'_>) -> Vec<Vec<f64>>,
+    pub(super) starts: fn(&FitStart<'_>) -> Vec<Vec<f64>>,
     /// Laws that this one becomes at some parameters: it fits no worse than they do.
     pub(super) contains: &'static [Contained],
     /// Nominal stresses and their derivatives with respect to the parameters, where they are known in closed form.
@@ -29,7 +29,7 @@ pub struct ModelDescriptor {
 }
 
 /// Maps parameters to better ones.
-pub(super) type Refine = fn(&[f64], &Start<'_>) -> Vec<f64>;
+pub(super) type Refine = fn(&[f64], &FitStart<'_>) -> Vec<f64>;
 
 /// A law inside another one.
 #[derive(Debug, Clone, Copy)]
@@ -37,7 +37,7 @@ pub(super) struct Contained {
     /// Key of the inner law.
     pub key: &'static str,
     /// Maps the best parameters of the inner law to those of the outer law at which both agree (or cannot be distinguished), followed by more starting points.
-    pub embed: fn(&[f64], &Start<'_>) -> Vec<Vec<f64>>,
+    pub embed: fn(&[f64], &FitStart<'_>) -> Vec<Vec<f64>>,
 }
 
 /// Computes P₁, P₂ and their derivatives with respect to each parameter, from the parameters and λ₁, λ₂.
@@ -59,7 +59,7 @@ pub enum ModelKind {
 }
 
 /// Data available before a fit.
-pub(super) struct Start<'a> {
+pub(super) struct FitStart<'a> {
     /// Lower limit of each parameter.
     pub limits: &'a [f64],
     /// The best neo-Hookean modulus, Pa.

@@ -10,9 +10,9 @@ use std::cell::Cell;
 use nalgebra::DVector;
 
 use super::data::TestData;
-use super::descriptor::Start;
+use super::descriptor::FitStart;
 pub use super::fit_map::{Identifiability, residuals};
-use super::fit_map::{Map, REJECTED};
+use super::fit_map::{ParameterMap, REJECTED};
 use super::{Error, Hyperelastic, ModelDescriptor, homogeneous};
 use crate::numerics::least_squares::{Optimum, levenberg_marquardt};
 
@@ -118,7 +118,7 @@ pub fn fit_until(
         });
     }
     let modulus = neo_hookean_modulus(table)?;
-    let map = Map::new(model, table, modulus)?;
+    let map = ParameterMap::new(model, table, modulus)?;
     let mut ends: Vec<(f64, DVector<f64>)> = Vec::new();
     let iterations = Cell::new(0);
     let residuals = |q: &DVector<f64>| {
@@ -127,7 +127,7 @@ pub fn fit_until(
         let rejected = || DVector::from_element(measurements, REJECTED);
         Some(map.residuals(q, table).unwrap_or_else(rejected))
     };
-    let start = Start { limits: &map.limits, modulus, table, stop };
+    let start = FitStart { limits: &map.limits, modulus, table, stop };
     let mut starts = (model.starts)(&start);
     for contained in model.contains {
         let inner = super::model(contained.key).and_then(|inner| fit_until(inner, table, stop));

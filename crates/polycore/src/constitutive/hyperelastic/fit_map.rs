@@ -35,7 +35,7 @@ pub fn residuals<L: Hyperelastic + ?Sized>(law: &L, table: &TestData) -> Result<
 const EFFECT: f64 = 1e-6;
 
 /// Uncertainty of the parameters at a minimum.
-pub(super) struct Uncertainty {
+pub(super) struct FitUncertainty {
     /// Standard errors.
     pub errors: Vec<Option<f64>>,
     /// Verdict on each parameter.
@@ -56,7 +56,7 @@ fn measured<'a>(
 }
 
 /// Between the parameters p of a law and the unbounded q of the optimiser.
-pub(super) struct Map<'a> {
+pub(super) struct ParameterMap<'a> {
     model: &'a ModelDescriptor,
     /// Lower limit of each p.
     pub limits: Vec<f64>,
@@ -66,7 +66,7 @@ pub(super) struct Map<'a> {
 /// |q| beyond which a parameter is at its limit or at infinity for all purposes; e^±40 = 4e∓18.
 const FARTHEST: f64 = 40.0;
 
-impl<'a> Map<'a> {
+impl<'a> ParameterMap<'a> {
     pub fn new(model: &'a ModelDescriptor, table: &TestData, modulus: f64) -> Result<Self, Error> {
         let mut limits = Vec::new();
         for parameter in model.parameters {
@@ -163,8 +163,8 @@ impl<'a> Map<'a> {
     }
 
     /// Computes the uncertainty of the parameters. Those without effect on the residuals have no standard error; none has if the others are collinear.
-    pub fn uncertainty(&self, q: &DVector<f64>, table: &TestData) -> Uncertainty {
-        let mut found = Uncertainty {
+    pub fn uncertainty(&self, q: &DVector<f64>, table: &TestData) -> FitUncertainty {
+        let mut found = FitUncertainty {
             errors: vec![None; q.len()],
             identifiability: vec![Identifiability::Determined; q.len()],
             draws: Vec::new(),

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::descriptor::{ABSENT, Start};
+use super::descriptor::{ABSENT, FitStart};
 
 /// |α| of the grid; both signs are tried.
 const EXPONENTS: [f64; 14] = [0.3, 0.6, 1.0, 1.5, 2.0, 2.7, 3.6, 4.8, 6.5, 9.0, 12.0, 17.0, 24.0, 34.0];
@@ -14,7 +14,7 @@ const KEPT: usize = 8;
 const GROWN: usize = 3;
 
 /// Parameter sets [μ₁, α₁, …] in Abaqus' convention, best first, no two of them neighbours on the grid.
-pub(super) fn starts<const TERMS: usize>(start: &Start<'_>) -> Vec<Vec<f64>> {
+pub(super) fn starts<const TERMS: usize>(start: &FitStart<'_>) -> Vec<Vec<f64>> {
     let (exponents, mut columns, data) = columns(start);
     if exponents.len() < TERMS {
         return Vec::new();
@@ -60,7 +60,7 @@ pub(super) fn starts<const TERMS: usize>(start: &Start<'_>) -> Vec<Vec<f64>> {
 
 /// A law of one term less as a start, its new term absent; and with a new term of an exponent of the grid that lowers the
 /// misfit, the best three.
-pub(super) fn grown(smaller: &[f64], start: &Start<'_>) -> Vec<Vec<f64>> {
+pub(super) fn grown(smaller: &[f64], start: &FitStart<'_>) -> Vec<Vec<f64>> {
     let total: f64 = smaller.chunks_exact(2).map(|term| term[0]).sum();
     let mut all = vec![[smaller, &[ABSENT * total, 1.0]].concat()];
     let present: Vec<usize> = (0..smaller.len() / 2).filter(|i| smaller[2 * i] > 1e-12 * total).collect();
@@ -96,7 +96,7 @@ pub(super) fn grown(smaller: &[f64], start: &Start<'_>) -> Vec<Vec<f64>> {
 }
 
 /// The stresses of one term of unit modulus, where they are finite.
-fn column(start: &Start<'_>, exponent: f64) -> Option<DVector<f64>> {
+fn column(start: &FitStart<'_>, exponent: f64) -> Option<DVector<f64>> {
     let mut values = Vec::with_capacity(start.table.measurements());
     for state in &start.table.states {
         let found = slopes(&[1.0, exponent], state.stretches, &mut [[0.0; 2]; 2]);
@@ -107,7 +107,7 @@ fn column(start: &Start<'_>, exponent: f64) -> Option<DVector<f64>> {
 }
 
 /// The exponents whose stresses are finite in the data, those stresses of unit moduli, and the data in units of the modulus.
-fn columns(start: &Start<'_>) -> (Vec<f64>, Vec<DVector<f64>>, DVector<f64>) {
+fn columns(start: &FitStart<'_>) -> (Vec<f64>, Vec<DVector<f64>>, DVector<f64>) {
     let grid = EXPONENTS.iter().rev().map(|a| -a).chain(EXPONENTS);
     let (exponents, columns) =
         grid.filter_map(|exponent| column(start, exponent).map(|column| (exponent, column))).unzip();

@@ -5,7 +5,7 @@ use super::data::Mode;
 
 /// A row of a table of one stress or two.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Row {
+pub(super) struct TestRow {
     pub index: usize,
     pub mode: Mode,
     /// True for a test labelled as compression.
@@ -31,7 +31,7 @@ const HELD: f64 = 0.95;
 /// A row, and what would be allowed there: strains that are stretches or in per cent, stretches that are strains,
 /// stresses against the strain.
 pub(super) fn plausible(
-    rows: &mut Vec<Row>,
+    rows: &mut Vec<TestRow>,
     notes: &mut Vec<String>,
     measure: StrainMeasure,
     said: bool,
@@ -49,13 +49,14 @@ pub(super) fn plausible(
                        `strain = \"stretch\"`";
         return Err((rows[0].index, allowed.to_owned()));
     }
-    let counts = |row: &&Row| row.nominal[0].abs() > NOISE * largest && (row.stretches[0] - 1.0).abs() > 1e-3;
-    let measured: Vec<Row> = rows.iter().filter(counts).copied().collect();
-    let against: Vec<&Row> =
+    let counts =
+        |row: &&TestRow| row.nominal[0].abs() > NOISE * largest && (row.stretches[0] - 1.0).abs() > 1e-3;
+    let measured: Vec<TestRow> = rows.iter().filter(counts).copied().collect();
+    let against: Vec<&TestRow> =
         measured.iter().filter(|row| (row.stretches[0] - 1.0) * row.nominal[0] < 0.0).collect();
     if against.len() * 5 > measured.len() {
         let row = *against[0];
-        let positive = |row: &Row| row.nominal[0] > 0.0;
+        let positive = |row: &TestRow| row.nominal[0] > 0.0;
         let squeezed = measured.iter().all(|row| positive(row) && row.stretches[0] < 1.0);
         // a strain grows with its stress, a stretch below 1 falls
         let rising = slope(&measured) > 0.0;
@@ -82,24 +83,25 @@ pub(super) fn plausible(
 }
 
 /// Returns true if the strains look like stretches: around 1 the stress is about 0, and none is near 0.
-fn called_strain(rows: &[Row], largest: f64) -> bool {
-    let at_rest = |row: &Row| (row.written[0] - 1.0).abs() < 0.02 && row.nominal[0].abs() <= NOISE * largest;
+fn called_strain(rows: &[TestRow], largest: f64) -> bool {
+    let at_rest =
+        |row: &TestRow| (row.written[0] - 1.0).abs() < 0.02 && row.nominal[0].abs() <= NOISE * largest;
     rows.iter().any(at_rest)
         && rows.iter().all(|row| row.written[0] > 0.3)
         && rows.iter().any(|row| row.written[0] > 1.02 || row.written[0] < 0.98)
 }
 
 /// Covariance of stretch and stress.
-fn slope(rows: &[Row]) -> f64 {
+fn slope(rows: &[TestRow]) -> f64 {
     let count = rows.len().max(1) as f64;
-    let mean = |of: fn(&Row) -> f64| rows.iter().map(of).sum::<f64>() / count;
+    let mean = |of: fn(&TestRow) -> f64| rows.iter().map(of).sum::<f64>() / count;
     let (x, y) = (mean(|row| row.stretches[0]), mean(|row| row.nominal[0]));
     rows.iter().map(|row| (row.stretches[0] - x) * (row.nominal[0] - y)).sum()
 }
 
 /// Leaves out rows after the largest stress of each specimen in tension where the stress falls and the specimen is not
 /// unloaded.
-fn leave_out_tails(rows: &mut Vec<Row>, notes: &mut Vec<String>, mode: Mode) {
+fn leave_out_tails(rows: &mut Vec<TestRow>, notes: &mut Vec<String>, mode: Mode) {
     let places: Vec<usize> = (0..rows.len()).filter(|&i| rows[i].mode == mode).collect();
     let strain = |i: usize| rows[i].stretches[0] - 1.0;
     let mut lost = Vec::new();

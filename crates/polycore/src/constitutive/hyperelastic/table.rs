@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use super::Error;
-use super::columns::{MODES, Role, StrainMeasure, TestStressMeasure, What, mode};
+use super::columns::{ColumnKind, MODES, Role, StrainMeasure, TestStressMeasure, mode};
 use super::data::{Mode, TestData, TestState};
-use super::plausible::{Row, plausible};
+use super::plausible::{TestRow, plausible};
 use crate::table::{self, plain_unit, plainly};
 use crate::units::Unit;
 use crate::units::dimension::{RatioDimension, StressDimension};
@@ -75,7 +75,7 @@ impl TestData {
     /// stiffness below zero, no measurement at all.
     pub fn parse_as(name: &str, bytes: Vec<u8>, meaning: &TestFormat) -> Result<ImportedTest, Error> {
         let file = table::Table::parse(name, bytes).map_err(located)?;
-        let columns = Columns::of(&file, meaning).map_err(located)?;
+        let columns = TestColumns::of(&file, meaning).map_err(located)?;
         columns.read(&file, meaning).map_err(located)
     }
 }
@@ -90,7 +90,7 @@ fn located(error: table::Error) -> Error {
 
 /// A column and its measure.
 #[derive(Clone)]
-struct Chosen<M> {
+struct TestColumn<M> {
     column: usize,
     measure: M,
     /// The heading does not say which.
@@ -99,31 +99,33 @@ struct Chosen<M> {
     unit: Option<String>,
 }
 
-struct Columns {
+struct TestColumns {
     mode: Option<usize>,
-    strains: Vec<Chosen<StrainMeasure>>,
-    stresses: Vec<Chosen<TestStressMeasure>>,
+    strains: Vec<TestColumn<StrainMeasure>>,
+    stresses: Vec<TestColumn<TestStressMeasure>>,
 }
 
 const LAYOUTS: &str = "a strain (`stretch`, `strain [%]`) and a stress (`nominal [MPa]`), with a `mode` in each row if there are \
                        several tests, or `stretch_1`, `stretch_2`, `nominal_1 [MPa]`, `nominal_2 [MPa]`";
 
-impl Columns {
+impl TestColumns {
     fn of(file: &table::Table, meaning: &TestFormat) -> Result<Self, table::Error> {
         let roles: Vec<Option<Role>> = file.headings.iter().map(Role::from_heading).collect();
-        let strain = |what: What| if let What::Strain(measure) = what { Some(measure) } else { None };
-        let stress = |what: What| if let What::Stress(measure) = what { Some(measure) } else { None };
+        let strain =
+            |what: ColumnKind| if let ColumnKind::Strain(measure) = what { Some(measure) } else { None };
+        let stress =
+            |what: ColumnKind| if let ColumnKind::Stress(measure) = what { Some(measure) } else { None };
         let mut strains = Vec::new();
         let mut stresses = Vec::new();
         let paired = |axis| {
-            let has = |test: &dyn Fn(What) -> bool| {
+            let has = |test: &dyn Fn(ColumnKind) -> bool| {
                 roles.iter().flatten().any(|role| role.axis == Some(axis) && test(role.what))
             };
             has(&|what| strain(what).is_some()) && has(&|what| stress(what).is_some())
         };
         let biaxial = meaning.strain_column.is_none() && paired(0) && paired(1);
         // `strain 1, stress 1, strain 2, stress 2` are specimens side by side
-        let place = |axis, test: &dyn Fn(What) -> bool| {
+        let place = |axis, test: &dyn Fn(ColumnKind) -> bool| {
             roles.iter().position(|role| {
                 role.as_ref().is_some_and(|role| role.axis == Some(axis) && role.numbered && test(role.what))
             })
@@ -175,7 +177,7 @@ impl Columns {
             return Err(file.refuse_headings(allowed));
         }
         let named = |(i, role): (usize, &Option<Role>)| {
-            let is_mode = role.as_ref().is_some_and(|role| role.what == What::Mode);
+            let is_mode = role.as_ref().is_some_and(|role| role.what == ColumnKind::Mode);
             let says = || (0..file.rows()).any(|row| mode(file.text(row, i)).is_some());
             (is_mode && (file.headings[i].plain == MODES[0] || says())).then_some(i)
         };
@@ -184,7 +186,7 @@ impl Columns {
     }
 
     fn read(&self, file: &table::Table, meaning: &TestFormat) -> Result<ImportedTest, table::Error> {
-        let unit = |chosen: &Chosen<TestStressMeasure>| {
+        let unit = |chosen: &TestColumn<TestStressMeasure>| {
             let text = chosen.unit.as_deref().or(meaning.stress_unit.as_deref()).unwrap_or_default();
             Unit::<StressDimension>::parse(&plain_unit(text)).map_err(|error| {
                 let what = format!("unit of column {}, `{}`", chosen.column + 1, file.headings[chosen.column].text);
@@ -195,7 +197,7 @@ impl Columns {
             })
         };
         let units = self.stresses.iter().map(unit).collect::<Result<Vec<_>, _>>()?;
-        let ratio = |chosen: &Chosen<StrainMeasure>| {
+        let ratio = |chosen: &TestColumn<StrainMeasure>| {
             Unit::<RatioDimension>::parse(&plain_unit(chosen.unit.as_deref().unwrap_or_default())).map_err(
                 |error| {
                     let what = format!(
@@ -218,7 +220,7 @@ impl Columns {
         let mut blank = 0;
         for index in 0..file.rows() {
             let (test, compression) = self.test(file, index, meaning)?;
-            let mut row = Row {
+            let mut row = TestRow {
                 index,
                 mode: test,
                 compression,
@@ -284,7 +286,8 @@ impl Columns {
             plausible(&mut rows, &mut notes, chosen.measure, said, chosen.unit.is_some())
                 .map_err(|(row, allowed)| file.refuse_cell(row, chosen.column, &allowed))?;
         }
-        let state = |row: &Row| TestState { mode: row.mode, stretches: row.stretches, nominal: row.nominal };
+        let state =
+            |row: &TestRow| TestState { mode: row.mode, stretches: row.stretches, nominal: row.nominal };
         let source = file.remark("# source:").unwrap_or_default().to_owned();
         let table = TestData { source, states: rows.iter().map(state).collect() };
         if table.measurements() == 0 {
@@ -317,19 +320,19 @@ impl Columns {
     }
 
     /// Strains and stresses that headings or tests call compressive are below zero.
-    fn turn(&self, rows: &mut [Row], notes: &mut Vec<String>) {
+    fn turn(&self, rows: &mut [TestRow], notes: &mut Vec<String>) {
         let (strain, stress) = (&self.strains[0], &self.stresses[0]);
         if self.strains.len() == 2 {
             return;
         }
-        let strains: fn(&mut Row) -> &mut f64 = |row| &mut row.written[0];
-        let stresses: fn(&mut Row) -> &mut f64 = |row| &mut row.nominal[0];
+        let strains: fn(&mut TestRow) -> &mut f64 = |row| &mut row.written[0];
+        let stresses: fn(&mut TestRow) -> &mut f64 = |row| &mut row.nominal[0];
         let turned = strain.measure != StrainMeasure::Stretch;
         for (name, value, may, by_heading) in [
             ("strains", strains, turned, strain.compressive && turned),
             ("stresses", stresses, true, stress.compressive),
         ] {
-            let mut of: Vec<&mut Row> =
+            let mut of: Vec<&mut TestRow> =
                 rows.iter_mut().filter(|row| may && (by_heading || row.compression)).collect();
             if of.iter_mut().all(|row| *value(row) >= 0.0) && !of.is_empty() {
                 of.iter_mut().for_each(|row| *value(row) = 0.0 - *value(row));
@@ -375,7 +378,7 @@ struct Wanted<'a, M> {
     key: &'static str,
     name: Option<&'a str>,
     measure: Option<M>,
-    of: &'a dyn Fn(What) -> Option<Option<M>>,
+    of: &'a dyn Fn(ColumnKind) -> Option<Option<M>>,
     order: &'a [M],
     assumed: M,
 }
@@ -385,9 +388,9 @@ fn choose<M: Copy + PartialEq>(
     roles: &[Option<Role>],
     axis: Option<usize>,
     wanted: &Wanted<M>,
-) -> Result<Chosen<M>, table::Error> {
+) -> Result<TestColumn<M>, table::Error> {
     let key = wanted.key;
-    let chosen = |column: usize, measure: Option<M>, role: Option<&Role>| Chosen {
+    let chosen = |column: usize, measure: Option<M>, role: Option<&Role>| TestColumn {
         column,
         measure: wanted.measure.or(measure).unwrap_or(wanted.assumed),
         assumed: wanted.measure.or(measure).is_none(),
@@ -430,7 +433,7 @@ fn choose<M: Copy + PartialEq>(
     match found[..] {
         [(column, measure, role)] => Ok(chosen(*column, *measure, Some(role))),
         [] => {
-            let raw = roles.iter().flatten().any(|role| role.what == What::Raw);
+            let raw = roles.iter().flatten().any(|role| role.what == ColumnKind::Raw);
             let advice = "; forces are divided by the undeformed area, displacements by the free length";
             Err(file.refuse_headings(format!("{LAYOUTS}{}", if raw { advice } else { "" })))
         }

@@ -65,7 +65,7 @@ impl Activation {
 
 /// Plain loops without branches: the compiler turns them into vectors of the dispatched width.
 #[inline(always)]
-fn fill<F: Function, T: Real, const FUSED: bool>(
+fn fill<F: SmoothFunction, T: Real, const FUSED: bool>(
     sums: &[T],
     values: &mut [T],
     first: &mut [T],
@@ -91,7 +91,7 @@ fn fill<F: Function, T: Real, const FUSED: bool>(
 }
 
 /// A function of one variable with two derivatives, without branches.
-trait Function {
+trait SmoothFunction {
     fn derivatives<T: Real, const FUSED: bool>(x: T) -> [T; 3];
 }
 
@@ -103,14 +103,14 @@ struct Sigmoid;
 struct Silu;
 struct Elu;
 
-impl Function for Linear {
+impl SmoothFunction for Linear {
     #[inline(always)]
     fn derivatives<T: Real, const FUSED: bool>(x: T) -> [T; 3] {
         [x, T::ONE, T::ZERO]
     }
 }
 
-impl Function for Relu {
+impl SmoothFunction for Relu {
     #[inline(always)]
     fn derivatives<T: Real, const FUSED: bool>(x: T) -> [T; 3] {
         // NaN is not ≤ 0 and stays
@@ -119,7 +119,7 @@ impl Function for Relu {
     }
 }
 
-impl Function for Softplus {
+impl SmoothFunction for Softplus {
     #[inline(always)]
     fn derivatives<T: Real, const FUSED: bool>(x: T) -> [T; 3] {
         let small = exp_of_minus_size::<T, FUSED>(x);
@@ -129,7 +129,7 @@ impl Function for Softplus {
     }
 }
 
-impl Function for Tanh {
+impl SmoothFunction for Tanh {
     #[inline(always)]
     fn derivatives<T: Real, const FUSED: bool>(x: T) -> [T; 3] {
         // (1 − e^{−2|x|})/(1 + e^{−2|x|}): to rounding of 1, not of small x
@@ -141,7 +141,7 @@ impl Function for Tanh {
     }
 }
 
-impl Function for Sigmoid {
+impl SmoothFunction for Sigmoid {
     #[inline(always)]
     fn derivatives<T: Real, const FUSED: bool>(x: T) -> [T; 3] {
         let s = logistic(x, exp_of_minus_size::<T, FUSED>(x));
@@ -150,7 +150,7 @@ impl Function for Sigmoid {
     }
 }
 
-impl Function for Silu {
+impl SmoothFunction for Silu {
     #[inline(always)]
     fn derivatives<T: Real, const FUSED: bool>(x: T) -> [T; 3] {
         let s = logistic(x, exp_of_minus_size::<T, FUSED>(x));
@@ -161,7 +161,7 @@ impl Function for Silu {
     }
 }
 
-impl Function for Elu {
+impl SmoothFunction for Elu {
     #[inline(always)]
     fn derivatives<T: Real, const FUSED: bool>(x: T) -> [T; 3] {
         let e = exp_of_minus_size::<T, FUSED>(x);

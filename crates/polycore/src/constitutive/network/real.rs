@@ -5,7 +5,7 @@ use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
 /// Floating-point type with vectors of the machine's widest instructions.
-pub trait Lanes: Copy {
+pub trait SimdLanes: Copy {
     /// A vector.
     type Vector<S: Simd>: Copy;
     /// Outputs that stand side by side in packed weights: 128 bytes.
@@ -29,7 +29,7 @@ pub trait Lanes: Copy {
 
 /// The two precisions of inference.
 pub trait Real:
-    Lanes
+    SimdLanes
     + Copy
     + Default
     + Debug
@@ -70,7 +70,7 @@ macro_rules! real {
     ($type:ident, $bits:ident, vectors $vectors:ident, $lanes:ident, $splat:ident, $mul_add:ident, $sum:ident, $as:ident, $as_mut:ident,
      panel $panel:literal, magic $magic:literal, mantissa $mantissa:literal, least $least:literal, bias $bias:literal,
      ln2 $high:literal + $low:literal, exp $exp:literal, artanh $artanh:literal) => {
-        impl Lanes for $type {
+        impl SimdLanes for $type {
             type Vector<S: Simd> = S::$vectors;
             const PANEL: usize = $panel;
             #[inline(always)]

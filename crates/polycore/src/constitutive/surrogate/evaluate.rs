@@ -1,6 +1,6 @@
 //! Predictions at C: members, their mean, lists of points.
 
-use super::{Kind, Memory, Prediction, RestTerm, Surrogate, Workspace, back, product};
+use super::{Kind, Prediction, RestTerm, Surrogate, SurrogateScratch, Workspace, back, product};
 use crate::constitutive::Error;
 use crate::constitutive::law::same_length;
 use crate::constitutive::network::{BATCH, LANES, Real, Tape};
@@ -60,7 +60,7 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
     fn side_by_side(
         &self,
         c: &[SVector<T, 6>],
-        memory: &mut Memory<T>,
+        memory: &mut SurrogateScratch<T>,
         predictions: &mut [Prediction<T>],
     ) -> Result<(), Error> {
         let members = self.members.len();
@@ -116,7 +116,7 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         &self,
         c: &SVector<T, 6>,
         tangent: bool,
-        memory: &mut Memory<T>,
+        memory: &mut SurrogateScratch<T>,
     ) -> Result<Prediction<T>, Error> {
         check_deformation(c)?;
         let at: [T; 6] = (*c).into();

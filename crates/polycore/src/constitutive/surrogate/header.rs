@@ -1,6 +1,6 @@
 //! Metadata of a learnt law.
 
-use super::invariants::Invariants;
+use super::invariants::SymmetryInvariants;
 use super::{Softening, Support, Symmetry};
 use crate::constitutive::Error;
 use crate::constitutive::network::{Activation, Architecture};
@@ -64,18 +64,18 @@ impl Kind {
     }
 
     /// The invariants of an energy.
-    pub fn invariants(&self) -> Option<Invariants> {
+    pub fn invariants(&self) -> Option<SymmetryInvariants> {
         match self {
             Self::Ann => None,
             Self::Energy { symmetry, polyconvex, norms, .. } => {
-                Some(Invariants::new(*symmetry, *polyconvex, *norms))
+                Some(SymmetryInvariants::new(*symmetry, *polyconvex, *norms))
             }
         }
     }
 
     /// Inputs of its networks: 6, or the number of invariants.
     pub fn inputs(&self) -> usize {
-        self.invariants().map_or(6, Invariants::count)
+        self.invariants().map_or(6, SymmetryInvariants::count)
     }
 
     /// Outputs of its networks: 6 or 1.

@@ -146,16 +146,16 @@ impl<T: Real> Nearest<T> {
 
     /// Distance of the nearest representative, in standard deviations.
     pub fn distance(&self, c: &[T; 6]) -> f64 {
-        Arch::new().dispatch(Search { nearest: self, c }).to_f64().sqrt()
+        Arch::new().dispatch(NearestSearch { nearest: self, c }).to_f64().sqrt()
     }
 }
 
-struct Search<'a, T> {
+struct NearestSearch<'a, T> {
     nearest: &'a Nearest<T>,
     c: &'a [T; 6],
 }
 
-impl<T: Real> WithSimd for Search<'_, T> {
+impl<T: Real> WithSimd for NearestSearch<'_, T> {
     type Output = T;
 
     #[inline(always)]

@@ -4,7 +4,7 @@ use polycore::constitutive::hyperelastic::data::TestData;
 use polycore::constitutive::hyperelastic::fit::{Agreement, Fit};
 
 /// Fits to one table.
-pub struct Set<'a> {
+pub struct TableFits<'a> {
     pub name: &'a str,
     pub table: &'a TestData,
     /// Layout of the file.
@@ -16,7 +16,7 @@ pub struct Set<'a> {
     pub crossed: Vec<(&'static str, &'a str, Option<Agreement>)>,
 }
 
-impl Set<'_> {
+impl TableFits<'_> {
     /// The unit of its stresses, and its Pa: by the largest modulus.
     pub fn unit(&self) -> (&'static str, f64) {
         unit_of(self.fits.iter().map(|fit| fit.law.shear_modulus()).fold(0.0, f64::max))
