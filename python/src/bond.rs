@@ -38,8 +38,8 @@ fn node(ends: &[f64], panel: usize, at: f64) -> f64 {
     0.5 * ((1.0 - at) * ends[panel] + (1.0 + at) * ends[panel + 1])
 }
 
-/// D of Lobatto's points: the derivative of the polynomial at the points from its values (Trefethen 2000, Spectral Methods in
-/// MATLAB, chapter 6).
+/// D of Lobatto's points: the derivative of the polynomial at the points from its values (Trefethen 2000,
+/// Spectral Methods in MATLAB, chapter 6).
 fn differentiation() -> [[f64; DEGREE + 1]; DEGREE + 1] {
     let x = nodes();
     let c = |k: usize| {
@@ -96,7 +96,8 @@ impl Sampled {
         law
     }
 
-    /// The energies at the points, from 0 at rest outwards: Gauss' rule of six points between neighbours is exact.
+    /// The energies at the points, from 0 at rest outwards: Gauss' rule of six points between neighbours is
+    /// exact.
     fn integrate(&mut self) {
         const GAUSS: [[f64; 2]; 6] = [
             [-0.932_469_514_203_152, 0.171_324_492_379_170_36],
@@ -134,7 +135,8 @@ impl Sampled {
         }
     }
 
-    /// Tension (0), its derivative (1) or the energy (2) at a stretch; beyond the samples along the tangent at their end.
+    /// Tension (0), its derivative (1) or the energy (2) at a stretch; beyond the samples along the tangent
+    /// at their end.
     fn at(&self, what: usize, stretch: f64) -> f64 {
         let (low, high) = (self.ends[0], self.ends[2 * PANELS]);
         let inside = stretch.clamp(low, high);

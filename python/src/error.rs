@@ -10,7 +10,8 @@ pyo3::create_exception!(
     polymech,
     SceneError,
     PyValueError,
-    "A fault in a scene. The text has the lines of the scene with a caret; `key` is the path of the key, `line` its line."
+    "A fault in a scene. The text has the lines of the scene with a caret; `key` is the path of the key, \
+     `line` its line."
 );
 pyo3::create_exception!(
     polymech,

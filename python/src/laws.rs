@@ -206,7 +206,8 @@ fn points<T: Send>(
     found.map_err(value)
 }
 
-/// The best fit of a law to nominal stresses: P₁ at λ₁ of a `mode`, or (P₁, P₂) at (λ₁, λ₂) of `biaxial` rows.
+/// The best fit of a law to nominal stresses: P₁ at λ₁ of a `mode`, or (P₁, P₂) at (λ₁, λ₂) of `biaxial`
+/// rows.
 #[pyfunction]
 pub fn fit_law<'py>(
     py: Python<'py>,

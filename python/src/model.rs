@@ -28,7 +28,7 @@ type PrescribedRegion = (Py<PyAny>, Vec<Option<f64>>, Vec<f64>);
 /// A model as Python describes it; lengths in m.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-pub struct ModelSpec {
+pub struct SimulationSpec {
     /// `add` or `cut`, the kind, its numbers.
     shapes: Vec<(String, String, Vec<f64>)>,
     /// Two ends in a plane; in space a corner and two edges.
@@ -165,7 +165,7 @@ pub struct Simulation {
 #[pymethods]
 impl Simulation {
     #[new]
-    fn new(py: Python<'_>, spec: ModelSpec) -> PyResult<Self> {
+    fn new(py: Python<'_>, spec: SimulationSpec) -> PyResult<Self> {
         let sampled = match spec.law.bind(py).cast::<BondLaw>() {
             Ok(law) => Some(law.get().law.clone()),
             Err(_) => None,
@@ -294,7 +294,7 @@ fn shape<const D: usize>(kind: &str, numbers: &[f64]) -> PyResult<Shape<D>> {
 }
 
 fn build<const D: usize>(
-    spec: ModelSpec,
+    spec: SimulationSpec,
     sampled: Option<Arc<crate::bond::Sampled>>,
     named: Option<String>,
     raised: &Arc<Mutex<Option<PyErr>>>,

@@ -15,7 +15,7 @@ use pyo3::types::PyDict;
 /// A polymer as Python describes it, SI.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-pub struct PointSpec {
+pub struct MaterialPointSpec {
     density: f64,
     /// Temperatures, K, none of a constant, and values.
     conductivity: (Vec<f64>, Vec<f64>),
@@ -29,7 +29,7 @@ pub struct PointSpec {
     seed: f64,
 }
 
-impl PointSpec {
+impl MaterialPointSpec {
     fn polymer(self) -> Result<Semicrystalline, crystfem::Error> {
         let property = |name: &'static str, (temperatures, values): (Vec<f64>, Vec<f64>)| match values[..] {
             [value] if temperatures.is_empty() => Property::constant(name, value),
@@ -59,11 +59,12 @@ impl PointSpec {
     }
 }
 
-/// The material under a temperature history (s, K): columns `time`, `temperature`, `energy`, `rate` and its fields.
+/// The material under a temperature history (s, K): columns `time`, `temperature`, `energy`, `rate` and its
+/// fields.
 #[pyfunction]
 pub fn course<'py>(
     py: Python<'py>,
-    material: PointSpec,
+    material: MaterialPointSpec,
     time: Vec<f64>,
     temperature: Vec<f64>,
     degree: f64,
@@ -89,7 +90,8 @@ pub fn course<'py>(
     Ok(columns)
 }
 
-/// Fits K₀, K_G and n to α along temperature histories (s, K) that begin in the melt, after a first row in it.
+/// Fits K₀, K_G and n to α along temperature histories (s, K) that begin in the melt, after a first row in
+/// it.
 #[pyfunction]
 pub fn fit_kinetics<'py>(
     py: Python<'py>,

@@ -58,8 +58,9 @@ struct UncertaintyChunk<'a> {
     unseen: &'a mut [bool],
 }
 
-/// `stress` (N, 6) in Pa, `tangent` (N, 6, 6) in Pa if asked for, `energy` (N) in J/m³ (NaN of a law without), and of a learnt law
-/// `spread` (N), `deviation` (N, 6), `outside` and `unseen` (N, 6), `far`, `disagree` (N), at the rows of C, (N, 6) or (N, 9). A C of nine is taken for symmetric where it is within
+/// `stress` (N, 6) in Pa, `tangent` (N, 6, 6) in Pa if asked for, `energy` (N) in J/m³ (NaN of a law
+/// without), and of a learnt law `spread` (N), `deviation` (N, 6), `outside` and `unseen` (N, 6), `far`,
+/// `disagree` (N), at the rows of C, (N, 6) or (N, 9). A C of nine is taken for symmetric where it is within
 /// `rounding` of its largest entry.
 pub fn predict<'py>(
     py: Python<'py>,

@@ -21,7 +21,8 @@ macro_rules! of_program {
         match $program {
             "peri" => $function::<Peri>($($argument),*),
             "crystfem" => $function::<Crystfem>($($argument),*),
-            other => Err(PyValueError::new_err(format!("program: found {other:?}; allowed: \"peri\", \"crystfem\""))),
+            other => Err(PyValueError::new_err(format!("program: found {other:?}; allowed: \"peri\", \
+                \"crystfem\""))),
         }
     };
 }

@@ -30,7 +30,8 @@ impl LearntLaw {
         py.detach(|| surrogate::Surrogate::read(path)).map(|law| Self { law }).map_err(|error| file(&error))
     }
 
-    /// Builds a model from a header in JSON (its `architecture` and `members` follow from the weights) and W, (outputs, inputs), and b of each layer of each member.
+    /// Builds a model from a header in JSON (its `architecture` and `members` follow from the weights) and W,
+    /// (outputs, inputs), and b of each layer of each member.
     #[staticmethod]
     fn build(
         header: &str,

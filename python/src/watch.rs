@@ -74,8 +74,8 @@ impl<'a> RunLink<'a> {
     }
 }
 
-/// Runs `work` on a thread of its own, on `threads` threads where given. A signal (`KeyboardInterrupt`) and what a function of
-/// Python raises ask it to stop, and are raised when it has.
+/// Runs `work` on a thread of its own, on `threads` threads where given. A signal (`KeyboardInterrupt`) and
+/// what a function of Python raises ask it to stop, and are raised when it has.
 pub fn watched<T: Send>(
     py: Python<'_>,
     watchers: &Watchers,
@@ -112,8 +112,8 @@ pub fn stoppable<T: Send>(py: Python<'_>, work: impl FnOnce(&AtomicBool) -> T + 
     watched(py, &Watchers { progress: None, on_step: None }, None, |line| work(line.stop()))
 }
 
-/// Runs `work` that nothing can stop on a thread of its own, which a signal leaves to itself: it ends when it is done, and
-/// what it finds is dropped.
+/// Runs `work` that nothing can stop on a thread of its own, which a signal leaves to itself: it ends when it
+/// is done, and what it finds is dropped.
 pub fn left_alone<T: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce() -> T + Send + 'static,

@@ -17,7 +17,8 @@ fn count(bytes: i64) {
     MOST.set(MOST.get().max(held));
 }
 
-// SAFETY: every call is passed on to the system's allocator as it is; the counters need no allocation and no destructor.
+// SAFETY: every call is passed on to the system's allocator as it is; the counters need no allocation and no
+// destructor.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         count(layout.size() as i64);

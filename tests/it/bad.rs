@@ -1,7 +1,8 @@
 //! Malformed and absurd input: exit code 2, the message that helps, nothing written, no panic.
 //!
-//! Each scene is a patch of a valid one, with its fault and its message: `tests/bad/peri.txt` and `crystfem.txt`, whose heads tell how they
-//! are read; the valid scenes are in `tests/bad/peri/` and `crystfem/`.
+//! Each scene is a patch of a valid one, with its fault and its message: `tests/bad/peri.txt` and
+//! `crystfem.txt`, whose heads tell how they are read; the valid scenes are in `tests/bad/peri/` and
+//! `crystfem/`.
 
 use crate::program::{Ended, command, executable, finish, peri, workspace};
 use crate::scenes;
@@ -163,7 +164,8 @@ fn nesting_without_end() {
     refused(deep("title = \"", "long", "\"\n").as_bytes(), "").tells("`program` is missing");
 }
 
-/// A valid scene cut anywhere is refused, or is itself valid (where only a trailing part is gone); it never panics.
+/// A valid scene cut anywhere is refused, or is itself valid (where only a trailing part is gone); it never
+/// panics.
 #[test]
 fn cut_anywhere() {
     let scene = scenes::plate("\"100 mm\"", "1e-3");

@@ -62,7 +62,8 @@ impl Browser {
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
         let body = if method == "POST" { body.to_string() } else { String::new() };
         let head = format!(
-            "{method} /session{}{path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nContent-Length: {}\r\n\r\n",
+            "{method} /session{}{path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nContent-Length: \
+             {}\r\n\r\n",
             self.session,
             body.len()
         );
@@ -121,16 +122,22 @@ impl Browser {
         self.ask("POST", &format!("/element/{element}/value"), &json!({ "text": keys }));
     }
 
-    /// Drags fingers across the window, or the mouse with its button down, which pauses on the way; each from one place to another.
+    /// Drags fingers across the window, or the mouse with its button down, which pauses on the way; each from
+    /// one place to another.
     #[track_caller]
     pub fn drag(&self, kind: &str, ways: &[[[f64; 2]; 2]]) {
-        let step = |[x, y]: [f64; 2], duration: u32| json!({ "type": "pointerMove", "duration": duration, "x": x.round() as i64, "y": y.round() as i64 });
+        let step = |[x, y]: [f64; 2], duration: u32| {
+            let [x, y] = [x.round() as i64, y.round() as i64];
+            json!({ "type": "pointerMove", "duration": duration, "x": x, "y": y })
+        };
         let pointer = |(k, &[from, to]): (usize, &[[f64; 2]; 2])| {
             let half = [0, 1].map(|d| 0.5 * (from[d] + to[d]));
-            json!({ "type": "pointer", "id": format!("{kind}{k}"), "parameters": { "pointerType": kind }, "actions": [
-                step(from, 0), { "type": "pause", "duration": 400 }, { "type": "pointerDown", "button": 0 }, step(half, 80), step(to, 80),
-                { "type": "pointerUp", "button": 0 },
-            ] })
+            let actions = json!([
+                step(from, 0), { "type": "pause", "duration": 400 }, { "type": "pointerDown", "button": 0 },
+                step(half, 80), step(to, 80), { "type": "pointerUp", "button": 0 },
+            ]);
+            let id = format!("{kind}{k}");
+            json!({ "type": "pointer", "id": id, "parameters": { "pointerType": kind }, "actions": actions })
         };
         let actions: Vec<Value> = ways.iter().enumerate().map(pointer).collect();
         self.ask("POST", "/actions", &json!({ "actions": actions }));

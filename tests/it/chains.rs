@@ -1,4 +1,5 @@
-//! Scenes that read results of other scenes: what is missing or stale is told and computed, a changed file is noticed.
+//! Scenes that read results of other scenes: what is missing or stale is told and computed, a changed file is
+//! noticed.
 
 use crate::program::{Ended, command, finish, peri};
 use crate::results::{assert_same, report, scalar};
@@ -251,7 +252,8 @@ fn fields_that_cannot_be_used() {
     refused("none.vtkhdf");
 }
 
-/// The stress of a print, 1 MPa along its second axis, is there while a strip is held at its ends: it pulls them with stress × section.
+/// The stress of a print, 1 MPa along its second axis, is there while a strip is held at its ends: it pulls
+/// them with stress × section.
 #[test]
 fn a_stress_is_handed_over() {
     let directory = tempfile::tempdir().unwrap();
@@ -301,7 +303,8 @@ fn a_stress_is_handed_over() {
     strip(here, "").with_code(2).tells("`material.fields[0].from.field`");
 }
 
-/// A law that another scene learns: neo-Hooke's stresses S = μ(1 − C⁻¹) + ½λ(J² − 1)C⁻¹ of μ = 0.4 and λ = 1 MPa; the sheet has about its force.
+/// A law that another scene learns: neo-Hooke's stresses S = μ(1 − C⁻¹) + ½λ(J² − 1)C⁻¹ of μ = 0.4 and λ = 1
+/// MPa; the sheet has about its force.
 #[test]
 fn a_law_of_an_input() {
     let directory = tempfile::tempdir().unwrap();
@@ -318,8 +321,10 @@ fn a_law_of_an_input() {
             rows += &format!("p{path},{},{},{},0,0,0,{},{},{},0,0,0\n", c[0], c[1], c[2], s[0], s[1], s[2]);
         }
     }
-    let law = "version = 1\nprogram = \"mdsurrogate\"\n[data]\nfiles = [\"rows.csv\"]\n[training]\nepochs = 60\nlearning_rate = 1e-2\n\
-        [[model]]\nname = \"law\"\nkind = \"energy\"\nsymmetry = \"isotropic\"\npolyconvex = true\nhidden = [[8, \"softplus\"]]\n";
+    let law = "version = 1\nprogram = \"mdsurrogate\"\n[data]\nfiles = [\"rows.csv\"]\n[training]\nepochs = \
+               60\nlearning_rate = 1e-2\n\
+        [[model]]\nname = \"law\"\nkind = \"energy\"\nsymmetry = \"isotropic\"\npolyconvex = true\nhidden = \
+                            [[8, \"softplus\"]]\n";
     let block = STRIP.find("[material]").unwrap()..STRIP.find("[[boundary]]").unwrap();
     let solid = |law: &str| {
         let own = format!("[material.solid]\nlaw = \"correspondence\"\nconstitutive = {law}\n\n");
@@ -331,7 +336,8 @@ fn a_law_of_an_input() {
     strip(here, "--with-inputs").with_code(0);
     let force = |folder: &str| scalar(&report(&here.join(folder)), "reaction_x");
     let found = force("out/strip");
-    let bulk = "{ model = \"neo-hookean\", parameters = { shear_modulus = \"0.4 MPa\" }, bulk_modulus = \"1.2666667 MPa\" }";
+    let bulk = "{ model = \"neo-hookean\", parameters = { shear_modulus = \"0.4 MPa\" }, \
+                bulk_modulus = \"1.2666667 MPa\" }";
     write(here, &[("strip", &solid(bulk))]);
     strip(here, "--output out/exact").with_code(0);
     near(

@@ -97,7 +97,8 @@ fn inputs_of_mdsurrogate_that_cannot_be_used() {
     for line in ["info none.csv", "export none.safetensors out/law", "md run none"] {
         run(line).with_code(2).tells("none");
     }
-    let law = "version = 1\nprogram = \"mdsurrogate\"\ntitle = \"law\"\n[data]\nfiles = [\"rows.csv\"]\n[split]\nby = \"random\"\n\
+    let law = "version = 1\nprogram = \"mdsurrogate\"\ntitle = \"law\"\n[data]\nfiles = \
+               [\"rows.csv\"]\n[split]\nby = \"random\"\n\
                [training]\nepochs = 1\n[[model]]\nkind = \"energy\"\nhidden = [[4, \"softplus\"]]\n";
     let row = |k: usize| format!("{},1,1,0,0,0,{k},0,0,0,0,0\n", 1.0 + 0.01 * k as f64);
     let head = "C11,C22,C33,C12,C13,C23,S11,S22,S33,S12,S13,S23\n".to_owned();
@@ -262,7 +263,8 @@ fn particles_of_the_plate() -> usize {
     cells.filter(|(x, y)| x * x + y * y >= 3600.0).count()
 }
 
-/// Counts, among the bar's 20 × 4 × 4 cells, 10 mm wide, the pairs within 30.15 mm whose segment meets x = 100 mm at y up to `height` mm.
+/// Counts, among the bar's 20 × 4 × 4 cells, 10 mm wide, the pairs within 30.15 mm whose segment meets x =
+/// 100 mm at y up to `height` mm.
 fn pairs_across_the_crack(height: i32) -> usize {
     let cells = |from: i32, to: i32| {
         (from..to).flat_map(|x| (0..16).map(move |k| [x, k / 4, k % 4].map(|cell| 5 + 10 * cell)))
@@ -384,7 +386,8 @@ fn a_failed_expectation_is_exit_code_1() {
     let here = directory.path();
     let expect = |quantity: &str| {
         let more = format!(
-            "\n[[expect]]\nquantity = \"{quantity}\"\nreference = 3.0\ntolerance = \"1 %\"\nkind = \"closed-form\"\nsource = \"wish\"\n"
+            "\n[[expect]]\nquantity = \"{quantity}\"\nreference = 3.0\ntolerance = \"1 %\"\nkind = \
+             \"closed-form\"\nsource = \"wish\"\n"
         );
         scenes::plate("\"50 mm\"", "1e-3") + &more
     };

@@ -1,4 +1,5 @@
-//! The commands and links of README and docs: those that are cheap are run, the others must at least be understood.
+//! The commands and links of README and docs: those that are cheap are run, the others must at least be
+//! understood.
 
 use crate::program::{command, finish, workspace};
 use std::fs;
@@ -35,7 +36,8 @@ fn documents() -> Vec<PathBuf> {
     found
 }
 
-/// Commands in fences marked as shell, a backslash joining lines; output, comments and other languages are left out.
+/// Commands in fences marked as shell, a backslash joining lines; output, comments and other languages are
+/// left out.
 fn commands_of(file: &Path) -> Vec<Shown> {
     let text = fs::read_to_string(file).unwrap();
     let (mut shown, mut shell, mut inside) = (Vec::new(), false, false);
@@ -203,8 +205,8 @@ fn links_lead_to_files() {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
-/// Examples of the libraries are doctests of the crates, in the head of a `lib.rs`, or programs in their `examples`
-/// ([`crate::examples`] runs them).
+/// Examples of the libraries are doctests of the crates, in the head of a `lib.rs`, or programs in their
+/// `examples` ([`crate::examples`] runs them).
 #[test]
 fn rust_examples_are_doctests_or_programs() {
     let heads: Vec<String> = ["peri", "mdsurrogate"]

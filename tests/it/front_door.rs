@@ -1,7 +1,10 @@
-//! Robustness against input files damaged at random: scenes, meshes, tool paths, tables, clouds, HDF5, laws, checkpoints. No panic, no hang, no memory beyond what the file justifies, and an error that names the place.
+//! Robustness against input files damaged at random: scenes, meshes, tool paths, tables, clouds, HDF5, laws,
+//! checkpoints. No panic, no hang, no memory beyond what the file justifies, and an error that names the
+//! place.
 //!
-//! 2000 mutations of each kind, the same ones every time; `FRONT_DOOR=100000 cargo test --release -p tests front_door`
-//! takes that many, new ones every time. What it finds is kept in tests/proptest-regressions and tried first.
+//! 2000 mutations of each kind, the same ones every time;
+//! `FRONT_DOOR=100000 cargo test --release -p tests front_door` takes that many, new ones every time. What it
+//! finds is kept in tests/proptest-regressions and tried first.
 
 use crate::allocations;
 use crate::bad::write_bad_scenes;

@@ -107,7 +107,8 @@ fn a_quick_sweep_is_another_sweep() {
     peri("check bad.toml", here).with_code(2).tells("did you mean `set`?");
 }
 
-/// Parts of a sweep at the same time, as the job script starts them, and a table of all: that of one sweep, to the byte.
+/// Parts of a sweep at the same time, as the job script starts them, and a table of all: that of one sweep,
+/// to the byte.
 #[test]
 fn a_sweep_in_parts() {
     let directory = tempfile::tempdir().unwrap();

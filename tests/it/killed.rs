@@ -40,7 +40,8 @@ fn wait_for(path: &Path) {
     }
 }
 
-/// Starts a run of `scene.toml` and ends it as soon as it has written a checkpoint in the middle of a variant.
+/// Starts a run of `scene.toml` and ends it as soon as it has written a checkpoint in the middle of a
+/// variant.
 fn interrupt(here: &Path, signal: &str) -> crate::program::Ended {
     let checkpoint = here.join("out/checkpoint.bin");
     let child = start("run scene.toml --output out --threads 1 --checkpoint-every 0", here);
@@ -81,7 +82,8 @@ fn several() -> String {
     scene + "[[study]]\nspacing = [\"20 mm\", \"10 mm\", \"8 mm\", \"16 mm\"]\n"
 }
 
-/// The error is that of the first variant that fails, whichever does so earlier; what the others reached can be continued.
+/// The error is that of the first variant that fails, whichever does so earlier; what the others reached can
+/// be continued.
 #[test]
 fn several_variants_of_which_one_fails() {
     let directory = tempfile::tempdir().unwrap();

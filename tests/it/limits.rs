@@ -19,8 +19,10 @@ fn limited(program: &str, arguments: &str, limit: &str, here: &Path) -> Ended {
     finish(shell.spawn().unwrap())
 }
 
-const LAW: &str = "version = 1\nprogram = \"mdsurrogate\"\ntitle = \"law\"\n[data]\nfiles = [\"rows.csv\"]\n[split]\n\
-                   by = \"random\"\n[training]\nepochs = 2\n[[model]]\nkind = \"energy\"\nhidden = [[4, \"softplus\"]]\n";
+const LAW: &str = "version = 1\nprogram = \"mdsurrogate\"\ntitle = \"law\"\n[data]\nfiles = \
+                   [\"rows.csv\"]\n[split]\n\
+                   by = \"random\"\n[training]\nepochs = 2\n[[model]]\nkind = \"energy\"\nhidden = [[4, \
+                          \"softplus\"]]\n";
 
 fn rows() -> String {
     let row = |k: usize| format!("{},1,1,0,0,0,{k},0,0,0,0,0\n", 1.0 + 0.01 * k as f64);
@@ -77,7 +79,8 @@ fn memory_of_the_process() {
     let here = directory.path();
     let brick = "version = 1\nprogram = \"crystfem\"\n[mesh.brick]\nsize = [\"1 m\", \"1 m\", \"1 m\"]\n\
                  elements = [100, 100, 100]\n[materials.a]\nlaw = \"conductor\"\ndensity = \"1000 kg/m^3\"\n\
-                 conductivity = \"1 W/(m K)\"\nspecific_heat = \"1000 J/(kg K)\"\n[[region]]\nmaterial = \"a\"\n\
+                 conductivity = \"1 W/(m K)\"\nspecific_heat = \"1000 J/(kg K)\"\n[[region]]\nmaterial = \
+                                  \"a\"\n\
                  temperature = \"20 degC\"\n[time]\nend = \"10 s\"\nstep = \"1 s\"\n";
     fs::write(here.join("brick.toml"), brick).unwrap();
     // 4.1e8 bytes are needed

@@ -1,5 +1,5 @@
-//! Loads and displacements that a report tells, beside what a user works out by hand; and that each of its values is
-//! one that an expectation may ask for.
+//! Loads and displacements that a report tells, beside what a user works out by hand; and that each of its
+//! values is one that an expectation may ask for.
 
 use crate::program::peri;
 use crate::results::{report, scalar};
@@ -43,7 +43,8 @@ steps = 4
     )
 }
 
-/// Runs a scene; gives its report, and the mean displacement along x of the three last layers at the right and left.
+/// Runs a scene; gives its report, and the mean displacement along x of the three last layers at the right
+/// and left.
 fn pulled(left: &str, right: &str) -> (Value, [f64; 2]) {
     let directory = tempfile::tempdir().unwrap();
     fs::write(directory.path().join("strip.toml"), strip(left, right)).unwrap();
@@ -133,8 +134,8 @@ fn every_value_may_be_expected() {
     }
 }
 
-/// A notched strip under a growing force: the run ends with the error once it is torn, and keeps the last step in equilibrium, in
-/// its own run and as a variant that expects the error; a study of one tells both.
+/// A notched strip under a growing force: the run ends with the error once it is torn, and keeps the last
+/// step in equilibrium, in its own run and as a variant that expects the error; a study of one tells both.
 #[test]
 fn torn_by_a_force_a_run_keeps_its_last_equilibrium() {
     let scene = r#"version = 1

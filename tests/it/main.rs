@@ -1,5 +1,5 @@
-//! Whole-program tests: they run the released command lines as a user does, and know nothing of their insides (but
-//! [`front_door`], which takes the readers by themselves).
+//! Whole-program tests: they run the released command lines as a user does, and know nothing of their insides
+//! (but [`front_door`], which takes the readers by themselves).
 //!
 //! * [`bad`]: malformed and absurd scenes, patches in `tests/bad/`, each with the message it must get;
 //! * [`commands`]: exit codes, help, closed forms, reports and files;

@@ -1,5 +1,5 @@
-//! The memory of whole programs (Linux only): a run takes no more than `check` states, and a large one not much less;
-//! what asks for absurd sizes is refused before anything is allocated.
+//! The memory of whole programs (Linux only): a run takes no more than `check` states, and a large one not
+//! much less; what asks for absurd sizes is refused before anything is allocated.
 
 #![cfg(target_os = "linux")]
 
@@ -9,8 +9,8 @@ use std::fs;
 use std::path::Path;
 use std::time::Duration;
 
-/// A stated need above this is at most so many times what the run takes; below, constants dominate. Stated is what is
-/// allocated, taken what is ever written: most sites of a thin body are not.
+/// A stated need above this is at most so many times what the run takes; below, constants dominate. Stated is
+/// what is allocated, taken what is ever written: most sites of a thin body are not.
 const LARGE: f64 = 100e6;
 const FACTOR: f64 = 4.0;
 /// Memory that a program may take before it refuses a scene, bytes.
@@ -188,7 +188,8 @@ fn surrogate(more: &str) -> String {
 #[test]
 fn of_surrogates() {
     holds("mdsurrogate", &surrogate(""), &[("data.csv", data(10_000))]);
-    let wide = "[training]\nepochs = 1\nbatch = 512\n[[model]]\nkind = \"ann\"\nhidden = [[1200, \"softplus\"], [1200, \"softplus\"]]\n";
+    let wide = "[training]\nepochs = 1\nbatch = 512\n[[model]]\nkind = \"ann\"\nhidden = [[1200, \
+                \"softplus\"], [1200, \"softplus\"]]\n";
     holds("mdsurrogate", &surrogate(&format!("{wide}members = 2\n")), &[("data.csv", data(60))]);
 }
 

@@ -35,8 +35,8 @@ fn no_crate_is_built_with_what_it_does_not_need() {
     }
 }
 
-/// A library without scenes brings no harness, scene format, errors with carets, pictures or command line. Data sets of
-/// `mdsurrogate` and tool paths of `crystfem` are tables: they read CSV, too.
+/// A library without scenes brings no harness, scene format, errors with carets, pictures or command line.
+/// Data sets of `mdsurrogate` and tool paths of `crystfem` are tables: they read CSV, too.
 #[test]
 fn libraries_bring_no_shell() {
     for package in ["polycore", "peri", "crystfem", "mdsurrogate"] {

@@ -104,7 +104,8 @@ fn a_printed_bar() {
     assert_eq!(layers[..5], [1.0, 1.0, 2.0, 3.0, 3.0]);
     let temperature = series.data(0, "temperature_degC").unwrap();
     assert!(temperature.iter().any(|t| t.is_nan()) && temperature.iter().all(|t| t.is_nan() || *t >= 99.9));
-    // the probe lies between nodes of the second layer: it begins with that, and its values are between theirs
+    // the probe lies between nodes of the second layer: it begins with that, and its values are between
+    // theirs
     let rows = harness::output::csv::read(out.join("probe_middle.csv")).unwrap();
     let of = |name: &str| &rows.iter().find(|(heading, _)| heading.starts_with(name)).unwrap().1;
     assert!((10.0..10.1).contains(&of("time")[0]), "{}", of("time")[0]);
@@ -137,7 +138,8 @@ fn a_printed_bar() {
 /// The bar with its stress and the healing of its interfaces.
 pub fn warped() -> String {
     let mechanics = "[mechanics]\nmaterial = \"pa12\"\nlaw = \"pa12\"\n\n";
-    let healing = "[healing]\nmaterial = \"pa12\"\ntime = \"2 s\"\ntemperature = \"180 degC\"\nenergy = \"60 kJ/mol\"\n\n";
+    let healing = "[healing]\nmaterial = \"pa12\"\ntime = \"2 s\"\ntemperature = \"180 degC\"\nenergy = \
+                   \"60 kJ/mol\"\n\n";
     BAR.replace("[time]", &format!("{mechanics}{healing}[time]")).replace("latent_heat = \"209 J/g\"\n", "")
 }
 

@@ -11,7 +11,8 @@ fn crystfem(arguments: &str, here: &Path) -> Ended {
     finish(command("crystfem", arguments, here).spawn().unwrap())
 }
 
-/// The scene that hid NaN: Appendix B with its sign corrected takes steps by temperature only, and α passes 1.
+/// The scene that hid NaN: Appendix B with its sign corrected takes steps by temperature only, and α passes
+/// 1.
 #[test]
 fn a_state_that_is_not_finite_ends_the_run() {
     let directory = tempfile::tempdir().unwrap();
@@ -29,7 +30,8 @@ fn a_state_that_is_not_finite_ends_the_run() {
     // unless the scene asks for it, and then it must come
     let study = |set: &str| {
         format!(
-            "{scene}\n[[study]]\nname = \"as-coded\"\nexpect_error = \"alpha is not finite\"\nset = {{ {set} }}\n"
+            "{scene}\n[[study]]\nname = \"as-coded\"\nexpect_error = \"alpha is not finite\"\nset = \
+             {{ {set} }}\n"
         )
     };
     fs::write(here.join("asked.toml"), study("\"print.start\" = \"0 s\"")).unwrap();
@@ -44,10 +46,13 @@ fn a_state_that_is_not_finite_ends_the_run() {
 fn a_point_that_is_not_finite_ends_the_run() {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();
-    let scene = "version = 1\nprogram = \"crystfem\"\n[material]\nlaw = \"as-published\"\nsign = \"mended\"\nguarded = true\n\
-                 density = \"1010 kg/m^3\"\nconductivity = \"0.25 W/(m K)\"\nspecific_heat = \"2200 J/(kg K)\"\n\
+    let scene = "version = 1\nprogram = \"crystfem\"\n[material]\nlaw = \"as-published\"\nsign = \
+                 \"mended\"\nguarded = true\n\
+                 density = \"1010 kg/m^3\"\nconductivity = \"0.25 W/(m K)\"\nspecific_heat = \"2200 J/(kg \
+                             K)\"\n\
                  [output]\npictures = false\n\
-                 [[point]]\nname = \"p\"\nstart = \"200 degC\"\nlegs = [{ to = \"120 degC\", rate = \"10 K/min\" }]\n";
+                 [[point]]\nname = \"p\"\nstart = \"200 degC\"\nlegs = \
+                                     [{ to = \"120 degC\", rate = \"10 K/min\" }]\n";
     let run = |name: &str, keys: &str| {
         fs::write(here.join(format!("{name}.toml")), format!("{scene}{keys}")).unwrap();
         crystfem(&format!("run {name}.toml --output {name}"), here)
@@ -122,7 +127,10 @@ fn a_path_beside_the_part() {
     scene("");
     for verb in ["check", "run"] {
         let ended = crystfem(&format!("{verb} cube.toml"), here).with_code(2);
-        ended.tells("`print.path`: found a path from (105.5, 105.5, 0) mm to (124.5, 124.5, 2) mm whose beads cover no");
+        ended.tells(
+            "`print.path`: found a path from (105.5, 105.5, 0) mm to (124.5, 124.5, 2) mm whose \
+                     beads cover no",
+        );
         ended.tells("the part, which reaches from (0, 0, 0) mm to (20, 20, 2) mm");
     }
     // 76 of the 400 elements of a layer are under the wall
@@ -147,7 +155,10 @@ fn a_path_beside_the_part() {
     told.shows("the beads cover 9.5 % of the part; 50.0 % of their length lies outside of it");
     scene("centre = true\nfill = true");
     let told = crystfem("check cube.toml", here).with_code(0);
-    told.shows("the beads cover 19.0 % of the part; 0.0 % of their length lies outside of it; with gaps filled 100.0 %");
+    told.shows(
+        "the beads cover 19.0 % of the part; 0.0 % of their length lies outside of it; with gaps \
+                filled 100.0 %",
+    );
     told.shows("1600 elements in all");
 }
 

@@ -30,7 +30,8 @@ pub fn workspace() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
 }
 
-/// The released executable of a package, or an example. Cargo tells where it is: target directories can be anywhere.
+/// The released executable of a package, or an example. Cargo tells where it is: target directories can be
+/// anywhere.
 pub fn executable(package: &str) -> &'static Path {
     static BUILT: OnceLock<HashMap<String, PathBuf>> = OnceLock::new();
     &BUILT.get_or_init(build)[package]

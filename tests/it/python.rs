@@ -1,4 +1,5 @@
-//! The Python package: built with all else, packed as a wheel, installed into an environment of its own, and tested there by pytest.
+//! The Python package: built with all else, packed as a wheel, installed into an environment of its own, and
+//! tested there by pytest.
 
 use crate::program::{PACKAGES, executable, workspace};
 use std::path::{Path, PathBuf};
@@ -9,7 +10,8 @@ use std::time::Instant;
 const NEEDED: [&str; 3] = ["maturin", "numpy", "pytest"];
 const USED: [&str; 4] = ["matplotlib", "mypy", "pandas", "xarray"];
 
-/// `lib_polymech.so`: built with the packages that the other tests build, so that features of dependencies are the same.
+/// `lib_polymech.so`: built with the packages that the other tests build, so that features of dependencies
+/// are the same.
 fn library() -> PathBuf {
     let cargo = std::env::var_os("CARGO").unwrap_or("cargo".into());
     let mut command = Command::new(cargo);

@@ -22,8 +22,8 @@ pub fn scalar(report: &Value, name: &str) -> f64 {
 
 /// Reads all results of a run, file by file and folder by folder, without times: equal for equal runs.
 ///
-/// Numbers keep all digits of the JSON text (shortest representation that reads back to the same bits), so equal
-/// text is equal bits.
+/// Numbers keep all digits of the JSON text (shortest representation that reads back to the same bits), so
+/// equal text is equal bits.
 pub fn timeless(directory: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut files = BTreeMap::new();
     for entry in std::fs::read_dir(directory).unwrap() {

@@ -55,7 +55,8 @@ program = "peri"
 space = "solid"
 spacing = "10 mm"
 shapes = [{ add = "box", min = ["0 mm", "0 mm", "0 mm"], max = ["200 mm", "40 mm", "40 mm"] }]
-cracks = [{ from = ["100 mm", "0 mm", "0 mm"], to = ["100 mm", "20 mm", "0 mm"], and = ["100 mm", "0 mm", "40 mm"] }]
+cracks = [{ from = ["100 mm", "0 mm", "0 mm"], to = ["100 mm", "20 mm", "0 mm"],
+    and = ["100 mm", "0 mm", "40 mm"] }]
 
 [material]
 youngs_modulus = "1 MPa"

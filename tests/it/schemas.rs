@@ -27,7 +27,8 @@ fn cases(program: &str) -> Vec<(PathBuf, Value)> {
         .collect()
 }
 
-/// Checks a value against the part of draft 7 that the schemas use, patterns aside. The schemas were also checked with Python's `jsonschema`.
+/// Checks a value against the part of draft 7 that the schemas use, patterns aside. The schemas were also
+/// checked with Python's `jsonschema`.
 fn faults(root: &Value, schema: &Value, value: &Value, place: &str, faults: &mut Vec<String>) {
     let known = [
         "$ref",
@@ -222,7 +223,8 @@ fn words(schema: &Value, found: &mut BTreeSet<String>) {
     }
 }
 
-/// The reference pages of `crystfem` leave out no key and no choice: each stands there in backticks, alone or in a line of TOML.
+/// The reference pages of `crystfem` leave out no key and no choice: each stands there in backticks, alone or
+/// in a line of TOML.
 #[test]
 fn keys_are_in_the_reference() {
     let pages = ["part.md", "material.md"]

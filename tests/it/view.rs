@@ -74,7 +74,8 @@ fn choose(browser: &Browser, id: &str, entry: &str) {
     assert!(browser.value(&set).as_i64().unwrap() >= 0, "no {entry} in {id}");
 }
 
-/// The page of a run that tears: rendered, turned, cut, stepped by slider, key, click and play, by mouse and by fingers.
+/// The page of a run that tears: rendered, turned, cut, stepped by slider, key, click and play, by mouse and
+/// by fingers.
 #[test]
 fn a_sheet_that_tears() {
     let directory = tempfile::tempdir().unwrap();
@@ -116,9 +117,11 @@ fn a_sheet_that_tears() {
     // a click on the peak of the curve
     let place = |browser: &Browser, row: usize| -> [f64; 2] {
         let at = browser.value(&format!(
-            "(() => {{ const chart = document.getElementById('chart'), {{ xaxis, yaxis }} = chart._fullLayout, \
+            "(() => {{ const chart = document.getElementById('chart'), \
+             {{ xaxis, yaxis }} = chart._fullLayout, \
              box = chart.getBoundingClientRect(), line = chart.data[0]; \
-             return [box.left + xaxis._offset + xaxis.d2p(line.x[{row}]), box.top + yaxis._offset + yaxis.d2p(line.y[{row}])]; }})()"
+             return [box.left + xaxis._offset + xaxis.d2p(line.x[{row}]), \
+             box.top + yaxis._offset + yaxis.d2p(line.y[{row}])]; }})()"
         ));
         [0, 1].map(|k| at[k].as_f64().unwrap())
     };
@@ -163,7 +166,8 @@ fn a_sheet_that_tears() {
     assert_eq!(browser.requests(), Vec::<String>::new());
 }
 
-/// The page of a print on a telephone: layers come, the cut shows the inside, probes over time choose the step.
+/// The page of a print on a telephone: layers come, the cut shows the inside, probes over time choose the
+/// step.
 #[test]
 fn a_print_on_a_small_screen() {
     let directory = tempfile::tempdir().unwrap();

@@ -15,7 +15,8 @@ fn slips_are_reported() {
     let here = directory.path();
     let write = |name: &str, text: &str| fs::write(here.join(name), text).unwrap();
     // a quantity that no run reports
-    let expect = "\n[[expect]]\nquantity = \"layer-1.min_crystallinity\"\nat_least = 0.2\nkind = \"bound\"\nsource = \"none\"\n";
+    let expect = "\n[[expect]]\nquantity = \"layer-1.min_crystallinity\"\nat_least = 0.2\nkind = \
+                  \"bound\"\nsource = \"none\"\n";
     write("expect.toml", &(BAR.to_owned() + expect));
     for verb in ["check", "run"] {
         let ended = crystfem(&format!("{verb} expect.toml"), here).with_code(2);
@@ -34,9 +35,12 @@ fn slips_are_reported() {
     // a leg that is a jump
     write(
         "point.toml",
-        "version = 1\nprogram = \"crystfem\"\n[material]\nlaw = \"semicrystalline\"\ndensity = \"1010 kg/m^3\"\n\
-         conductivity = \"0.25 W/(m K)\"\nspecific_heat = \"2200 J/(kg K)\"\nkinetics = \"table-4.1-column-1\"\n\
-         crystallinity = 0.25\n[[point]]\nname = \"p\"\nstart = \"200 degC\"\nlegs = [{ to = \"120 degC\" }]\n",
+        "version = 1\nprogram = \"crystfem\"\n[material]\nlaw = \"semicrystalline\"\ndensity = \"1010 \
+         kg/m^3\"\n\
+         conductivity = \"0.25 W/(m K)\"\nspecific_heat = \"2200 J/(kg K)\"\nkinetics = \
+                          \"table-4.1-column-1\"\n\
+         crystallinity = 0.25\n[[point]]\nname = \"p\"\nstart = \"200 degC\"\nlegs = \
+             [{ to = \"120 degC\" }]\n",
     );
     crystfem("check point.toml", here)
         .with_code(0)
@@ -54,7 +58,8 @@ fn slips_are_reported() {
 fn a_mesh_without_its_unit() {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();
-    let mesh = "*NODE\n1, 0, 0, 0\n2, 60, 0, 0\n3, 60, 10, 0\n4, 0, 10, 0\n5, 0, 0, 6\n6, 60, 0, 6\n7, 60, 10, 6\n\
+    let mesh = "*NODE\n1, 0, 0, 0\n2, 60, 0, 0\n3, 60, 10, 0\n4, 0, 10, 0\n5, 0, 0, 6\n6, 60, 0, 6\n7, 60, \
+                10, 6\n\
                 8, 0, 10, 6\n*ELEMENT, TYPE=C3D8, ELSET=part\n1, 1, 2, 3, 4, 5, 6, 7, 8\n";
     fs::write(here.join("part.inp"), mesh).unwrap();
     let scene = |unit: &str, height: &str| {
@@ -87,12 +92,14 @@ fn few_lines() {
     ended.shows(" more values in report.json");
 }
 
-/// Values of layers and what is expected of each run in the table of a sweep, which a shorter sweep does not lose.
+/// Values of layers and what is expected of each run in the table of a sweep, which a shorter sweep does not
+/// lose.
 #[test]
 fn columns_of_a_sweep() {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();
-    let expect = "\n[[expect]]\nquantity = \"layer-3.least_crystallinity\"\nat_least = 0.2\nkind = \"bound\"\nsource = \"none\"\n";
+    let expect = "\n[[expect]]\nquantity = \"layer-3.least_crystallinity\"\nat_least = 0.2\nkind = \
+                  \"bound\"\nsource = \"none\"\n";
     let bar = BAR
         .replace("tolerance = \"1 K\"", "tolerance = \"3 K\"")
         .replace("end = \"120 s\"", "end = \"30 s\"");
@@ -124,7 +131,8 @@ fn columns_of_a_sweep() {
     assert_eq!(sweep("12s").lines().count(), 2);
 }
 
-/// Bisection by runs: the answer meets what is expected, a hundredth of the interval less does not, and all is in the table.
+/// Bisection by runs: the answer meets what is expected, a hundredth of the interval less does not, and all
+/// is in the table.
 #[test]
 fn the_least_value_that_passes() {
     let directory = tempfile::tempdir().unwrap();

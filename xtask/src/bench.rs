@@ -27,9 +27,9 @@ mod surrogate;
 /// Options of `bench`.
 #[derive(clap::Args)]
 pub struct Options {
-    /// `langevin`, `peri-laws`, `peri-peers` (beside LAMMPS), `peri-solvers [-- MM,MM…]`, `crystfem [-- PART… N,N…]`
-    /// (its brick beside CalculiX and scikit-fem), `mdsurrogate` (its training and answers beside PyTorch and onnxruntime), or a crate with a
-    /// `benches/measure.rs`.
+    /// `langevin`, `peri-laws`, `peri-peers` (beside LAMMPS), `peri-solvers [-- MM,MM…]`,
+    /// `crystfem [-- PART… N,N…]` (its brick beside CalculiX and scikit-fem), `mdsurrogate` (its training and
+    /// answers beside PyTorch and onnxruntime), or a crate with a `benches/measure.rs`.
     name: String,
     /// Print the rows as JSON.
     #[arg(long)]

@@ -1,4 +1,5 @@
-//! The licences of what our programs contain, for archives of binaries: each dependency with its terms and their text.
+//! The licences of what our programs contain, for archives of binaries: each dependency with its terms and
+//! their text.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -35,7 +36,8 @@ struct LinkedPackage {
     texts: Vec<String>,
 }
 
-/// The text of `THIRD-PARTY.md`: crates that the programs are linked with, and the licences that they come with.
+/// The text of `THIRD-PARTY.md`: crates that the programs are linked with, and the licences that they come
+/// with.
 ///
 /// # Errors
 /// Cargo fails; a crate without terms.
@@ -122,8 +124,10 @@ fn read_package(package: &Package, what: String, mit: &str, apache: &str) -> Res
 fn format_list(parts: &mut [LinkedPackage]) -> String {
     parts.sort_by(|a, b| a.what.cmp(&b.what));
     let mut text = String::from(
-        "# Third-party software\n\nThe programs contain these crates. `plotly` contains plotly.js (MIT, Copyright 2012-2025, \
-         Plotly, Inc.), which the pages of the command `view` contain too.\n\n| crate | licence |\n|---|---|\n",
+        "# Third-party software\n\nThe programs contain these crates. `plotly` contains plotly.js (MIT, \
+         Copyright 2012-2025, \
+         Plotly, Inc.), which the pages of the command `view` contain too.\n\n| crate | licence |\n\
+         |---|---|\n",
     );
     let mut texts: BTreeMap<String, (Vec<&str>, &str)> = BTreeMap::new();
     for part in parts.iter() {

@@ -1,4 +1,5 @@
-//! Project tasks, as `cargo xtask TASK`. They run the released command lines: what users run is what is judged and timed.
+//! Project tasks, as `cargo xtask TASK`. They run the released command lines: what users run is what is
+//! judged and timed.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -40,7 +41,8 @@ enum Task {
     Validate(validate::Options),
     /// Measure: `langevin`, `peri-peers`, or a crate that has a `benches/measure.rs` (`peri`).
     Bench(bench::Options),
-    /// Make the archive of a release for this system: programs, completions, man pages, licences of dependencies.
+    /// Make the archive of a release for this system: programs, completions, man pages, licences of
+    /// dependencies.
     Dist(dist::Options),
     /// Check the tree: lengths of source files, sizes of files in git.
     Tidy,

@@ -82,7 +82,8 @@ impl CaseOutcome {
         self.failure.is_none() && self.expect().iter().all(|judgement| judgement.pass)
     }
 
-    /// Verdict, quantity, value, requirement, kind, source of every expectation, and the failure if there is one.
+    /// Verdict, quantity, value, requirement, kind, source of every expectation, and the failure if there is
+    /// one.
     pub fn rows(&self) -> impl Iterator<Item = [String; 6]> {
         let failure = self.failure.as_ref().map(|failure| {
             let [verdict, run, empty] = ["FAIL", "(run)", ""].map(str::to_owned);
@@ -146,7 +147,8 @@ pub mod tests {
     pub fn report(value: f64) -> String {
         let mut report = Report::new("peri", "0", "");
         report.value(Named::new("kt", ""), value);
-        let expect = r#"{"quantity": "kt", "reference": 3.0, "tolerance": "1 %", "kind": "closed-form", "source": "a | b"}"#;
+        let expect = r#"{"quantity": "kt", "reference": 3.0, "tolerance": "1 %",
+            "kind": "closed-form", "source": "a | b"}"#;
         report.judge(&[serde_json::from_str(expect).expect("an expectation")], false);
         serde_json::to_string(&report).expect("JSON")
     }

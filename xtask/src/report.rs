@@ -1,5 +1,5 @@
-//! The report of `cargo xtask validate`: target/validation/{report.html, report.json, validation.md}, and, of a whole
-//! full run, docs/validation.md.
+//! The report of `cargo xtask validate`: target/validation/{report.html, report.json, validation.md}, and, of
+//! a whole full run, docs/validation.md.
 
 use std::collections::BTreeMap;
 use std::io::Write as _;

@@ -53,7 +53,8 @@ impl fmt::Display for SourceStamp {
 /// The numerics of `polycore`, on which the other crates rest.
 const NUMERICS: [&str; 4] = ["constitutive", "langevin", "random", "tensor"];
 
-/// Lists the sources that numbers of crates depend on: `parts` of their folders (`src`, `tests`), and the numerics of `polycore`.
+/// Lists the sources that numbers of crates depend on: `parts` of their folders (`src`, `tests`), and the
+/// numerics of `polycore`.
 pub fn sources(root: &Path, crates: &[&str], parts: &[&str]) -> Vec<String> {
     let folders =
         crates.iter().flat_map(|name| parts.iter().map(move |part| format!("crates/{name}/{part}")));

@@ -33,7 +33,7 @@ pub fn text(outcomes: &[CaseOutcome]) -> String {
     text
 }
 
-/// `22 cases, 0 failed; 282 expectations, 0 not satisfied: 120 closed-form, 40 published; 25 regression (no evidence)`.
+/// Last line of the summary: `22 cases, 0 failed; 282 expectations, 0 not satisfied: 120 closed-form, …`.
 pub fn sums(outcomes: &[CaseOutcome]) -> String {
     let failed = outcomes.iter().filter(|outcome| !outcome.passed()).count();
     let judged = || outcomes.iter().flat_map(CaseOutcome::expect);

@@ -1,5 +1,5 @@
-//! `cargo xtask test`: all tests; the numbers that they measure go to target/evidence.json, and what they could not test
-//! here is listed at the end.
+//! `cargo xtask test`: all tests; the numbers that they measure go to target/evidence.json, and what they
+//! could not test here is listed at the end.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -200,11 +200,13 @@ mod tests {
         write("1.json", r#"{"skipped": "export::fortran", "needs": "gfortran"}"#);
         write(
             "2.json",
-            r#"{"name": "n", "value": 1.5, "reference": 1.4, "tolerance": 0.2, "met": true, "test": "t", "file": "crates/peri/src/a.rs"}"#,
+            r#"{"name": "n", "value": 1.5, "reference": 1.4, "tolerance": 0.2, "met": true,
+                "test": "t", "file": "crates/peri/src/a.rs"}"#,
         );
         write(
             "3.json",
-            r#"{"name": "m", "value": "NaN", "at_most": 1e-12, "met": false, "test": "t", "file": "crates/peri/src/a.rs"}"#,
+            r#"{"name": "m", "value": "NaN", "at_most": 1e-12, "met": false,
+                "test": "t", "file": "crates/peri/src/a.rs"}"#,
         );
         write("4.17.part", "{");
         let (mut records, skips) = collect(folder.path()).expect("records");

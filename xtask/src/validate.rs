@@ -33,11 +33,12 @@ pub struct Options {
     /// Only this case: its folder or file, also one outside cases/; may be repeated.
     #[arg(long, value_name = "PATH")]
     case: Vec<PathBuf>,
-    /// Keep the results of cases that were run before and have not changed, and go on with one that was interrupted.
+    /// Keep the results of cases that were run before and have not changed, and go on with one that was
+    /// interrupted.
     #[arg(long)]
     resume: bool,
-    /// Run only part I of N of the cases, one that reads results of others in the part of those, and write no report: then
-    /// `--resume` puts together what all parts left in target/validation.
+    /// Run only part I of N of the cases, one that reads results of others in the part of those, and write no
+    /// report: then `--resume` puts together what all parts left in target/validation.
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
     /// Compare with the report.json of an earlier run: what moved, and by how much.
@@ -75,8 +76,8 @@ impl CaseFile {
     }
 }
 
-/// Puts cases behind those whose results they read; otherwise they keep their order. Those in a cycle come last: their program
-/// names it.
+/// Puts cases behind those whose results they read; otherwise they keep their order. Those in a cycle come
+/// last: their program names it.
 fn sort_by_inputs(cases: Vec<CaseFile>) -> Vec<CaseFile> {
     let mut waiting = cases;
     let mut ordered: Vec<CaseFile> = Vec::new();

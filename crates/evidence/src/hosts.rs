@@ -36,7 +36,8 @@ pub fn static_library(package: &str) -> PathBuf {
     let cargo = std::env::var_os("CARGO").unwrap_or("cargo".into());
     let mut build = Command::new(cargo);
     build.args(["build", "--release", "--quiet", "--message-format=json-render-diagnostics"]);
-    // both in one build: their libraries have names without a hash, and the examples of one need the other as it was built with it
+    // both in one build: their libraries have names without a hash, and the examples of one need the other as
+    // it was built with it
     build.args(["--package=umatht", "--package=umat"]);
     let text = run(build.current_dir(env!("CARGO_MANIFEST_DIR")));
     let messages = text.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
@@ -46,8 +47,8 @@ pub fn static_library(package: &str) -> PathBuf {
     names.rfind(|file| file.ends_with(&library)).unwrap_or_else(|| panic!("no {library}"))
 }
 
-/// The folder of a CalculiX 2.20 that was built from source, with its archive: the environment variable `CALCULIX_SOURCE`. Says that the test
-/// is skipped where there is none.
+/// The folder of a CalculiX 2.20 that was built from source, with its archive: the environment variable
+/// `CALCULIX_SOURCE`. Says that the test is skipped where there is none.
 #[track_caller]
 pub fn calculix() -> Option<PathBuf> {
     let folder = std::env::var_os("CALCULIX_SOURCE").map(PathBuf::from);
@@ -59,7 +60,8 @@ pub fn calculix() -> Option<PathBuf> {
     if there("gfortran") { found } else { None }
 }
 
-/// Links CalculiX with a material, which stands before the archive: its empty routines stay unless `symbols` are asked for.
+/// Links CalculiX with a material, which stands before the archive: its empty routines stay unless `symbols`
+/// are asked for.
 ///
 /// # Panics
 /// Where it cannot be linked.

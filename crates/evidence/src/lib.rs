@@ -1,8 +1,9 @@
 //! Numbers that tests measure, kept for the report of `cargo xtask validate`.
 //!
-//! A test says [`near`], [`at_most`] or [`within`] where it would say `assert!`, with a name that cases/thesis.toml
-//! refers to. The test fails as with `assert!`; and under `cargo xtask test`, which names a folder in [`FOLDER`], the
-//! number found is left there, met or not. [`skipped`] leaves there what a test could not find on this machine.
+//! A test says [`near`], [`at_most`] or [`within`] where it would say `assert!`, with a name that
+//! cases/thesis.toml refers to. The test fails as with `assert!`; and under `cargo xtask test`, which names a
+//! folder in [`FOLDER`], the number found is left there, met or not. [`skipped`] leaves there what a test
+//! could not find on this machine.
 
 pub mod hosts;
 pub mod measurement;

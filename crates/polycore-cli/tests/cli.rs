@@ -114,7 +114,8 @@ fn bad_scenes_exit_with_2_and_write_nothing() {
     assert_eq!(polycore(&["run", "no/such/case.toml"]).status.code(), Some(2));
 }
 
-/// Two scenes of one folder have results of their own, the parameters are printed, and so is what `peri` takes.
+/// Two scenes of one folder have results of their own, the parameters are printed, and so is what `peri`
+/// takes.
 #[test]
 fn what_a_newcomer_sees() {
     let (folder, scene) = folder(SCENE);
@@ -333,12 +334,14 @@ fn a_law_that_fails_is_named() {
 #[test]
 fn tables_of_laboratories() {
     let laboratory = "Test;Specimen;Strain (%);Stress (MPa)\nuniaxial;1;0,0;0\nuniaxial;1;50,0;0,527778\n\
-                      uniaxial;1;100,0;0,875\nequibiaxial;1;50,0;0,684156\nplanar;1;50,0;0,601852\nplanar;1;60,0;0,7\n";
+                      uniaxial;1;100,0;0,875\nequibiaxial;1;50,0;0,684156\nplanar;1;50,0;0,601852\n\
+                      planar;1;60,0;0,7\n";
     let (_folder, result) = fitted(laboratory, "");
     let shown = text(&result.stdout);
     assert_eq!(result.status.code(), Some(0), "{shown}{}", text(&result.stderr));
     for part in [
-        "separator `;`, decimal comma, UTF-8, headings in line 1, columns `Test`, `Strain (%)`, `Stress (MPa)`",
+        "separator `;`, decimal comma, UTF-8, headings in line 1, columns `Test`, `Strain (%)`, `Stress \
+         (MPa)`",
         "engineering strain and nominal stress (the headings do not say which; keys `strain` and `stress`)",
         "stretches 1.0000 to 2.0000",
     ] {
@@ -370,11 +373,13 @@ fn tables_of_laboratories() {
     assert_eq!(result.status.code(), Some(0), "{}", text(&result.stderr));
 }
 
-/// `cross` says where a law may be used: Ogden's term of α < 0, which fits bars, is far off in equibiaxial tension.
+/// `cross` says where a law may be used: Ogden's term of α < 0, which fits bars, is far off in equibiaxial
+/// tension.
 #[test]
 fn cross_ends_in_a_verdict() {
     let case = concat!(env!("CARGO_MANIFEST_DIR"), "/../../cases/external/treloar-fits/treloar1944_20C.csv");
-    let scene = "version = 1\nprogram = \"polycore\"\n[fit]\ncross = true\nlaws = [\"ogden-1\", \"eight-chain-root-i2\"]\n\
+    let scene = "version = 1\nprogram = \"polycore\"\n[fit]\ncross = true\nlaws = [\"ogden-1\", \
+                 \"eight-chain-root-i2\"]\n\
                  [[fit.data]]\nname = \"bar\"\nfile = \"t.csv\"\nmode = \"uniaxial\"\n\
                  [[fit.data]]\nname = \"sheet\"\nfile = \"t.csv\"\nmode = \"equibiaxial\"\n";
     let (folder, scene) = folder(scene);

@@ -36,7 +36,8 @@ pub fn atomic_write(
 /// Makes sure, before any computation, that results can be written into `directory`; creates it if needed.
 ///
 /// # Errors
-/// [`Error::OutputDirectory`] (exit code 2) if it cannot be created or written to; [`Error::Io`] (1) if the disk is full.
+/// [`Error::OutputDirectory`] (exit code 2) if it cannot be created or written to; [`Error::Io`] (1) if the
+/// disk is full.
 pub fn prepare_directory(directory: impl AsRef<Path>) -> Result<(), Error> {
     let directory = directory.as_ref();
     let fail = |reason: String| Error::OutputDirectory { path: directory.to_path_buf(), reason };

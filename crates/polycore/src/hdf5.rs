@@ -1,5 +1,5 @@
-//! Datasets of HDF5 files that others hand in: none is read before its size is believable. Files that are written, and what
-//! their errors say.
+//! Datasets of HDF5 files that others hand in: none is read before its size is believable. Files that are
+//! written, and what their errors say.
 
 use crate::Error;
 use rust_hdf5::{H5Dataset, H5File, Hdf5Error};
@@ -9,7 +9,8 @@ use std::path::Path;
 
 /// Deflate packs at best 1032 bytes into one (Deutsch 1996, RFC 1951: 258 bytes in two bits).
 const BEST_PACKING: f64 = 1032.0;
-/// Bytes that a dataset or a chunk may always have: a chunk is as large as it is when only a corner of it is used.
+/// Bytes that a dataset or a chunk may always have: a chunk is as large as it is when only a corner of it is
+/// used.
 const ALWAYS: f64 = (4 << 20) as f64;
 
 /// Opens a dataset of a file of `file_bytes`, if the file can hold what the dataset says that it has.
@@ -36,8 +37,8 @@ pub fn dataset(file: &H5File, name: &str, file_bytes: u64) -> Result<H5Dataset, 
     Ok(dataset)
 }
 
-/// A file that is being written. One that is dropped before it is closed, since a write failed, is left as it is: the library
-/// would try to finish it, and complain on standard error beside the error that is returned.
+/// A file that is being written. One that is dropped before it is closed, since a write failed, is left as it
+/// is: the library would try to finish it, and complain on standard error beside the error that is returned.
 pub struct Created(ManuallyDrop<H5File>);
 
 impl Created {

@@ -1,16 +1,16 @@
 //! Memory: what a program may still take, and how an amount is told.
 //!
-//! A program states what a scene needs before it takes it: `check` and `--explain` print a line of [`needs`], and a scene
-//! that needs more than [`available`] is refused.
+//! A program states what a scene needs before it takes it: `check` and `--explain` print a line of [`needs`],
+//! and a scene that needs more than [`available`] is refused.
 
 use std::path::Path;
 
 /// Bytes of a GiB.
 pub const GIB: f64 = (1_u64 << 30) as f64;
 
-/// Bytes that this program may still take: the least of what the machine has left (`MemAvailable` of Linux), what the
-/// limits of the process leave (`ulimit -v` and `ulimit -d`), and what each control group around it leaves (versions 1
-/// and 2); 16 GiB where nothing of these is told.
+/// Bytes that this program may still take: the least of what the machine has left (`MemAvailable` of Linux),
+/// what the limits of the process leave (`ulimit -v` and `ulimit -d`), and what each control group around it
+/// leaves (versions 1 and 2); 16 GiB where nothing of these is told.
 pub fn available() -> f64 {
     available_in(Path::new("/"))
 }
@@ -45,11 +45,13 @@ fn available_in(root: &Path) -> f64 {
         .unwrap_or(16.0 * GIB)
 }
 
-/// Files of a control group: its limit, what it has taken, and the entry of `memory.stat` that can be given back.
+/// Files of a control group: its limit, what it has taken, and the entry of `memory.stat` that can be given
+/// back.
 const VERSION_1: [&str; 3] = ["memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"];
 const VERSION_2: [&str; 3] = ["memory.max", "memory.current", "inactive_file"];
 
-/// Free memory within the limits of a control group and its ancestors, bytes; `None` without a limit. If the path belongs to another name space, as in a container, the groups that exist count.
+/// Free memory within the limits of a control group and its ancestors, bytes; `None` without a limit. If the
+/// path belongs to another name space, as in a container, the groups that exist count.
 fn in_group(mount: &Path, path: &str, [limit, taken, cache]: &[&str; 3]) -> Option<f64> {
     let folder = mount.join(path.trim_start_matches('/'));
     let above = folder.ancestors().take_while(|folder| folder.starts_with(mount));

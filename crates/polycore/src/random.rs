@@ -1,5 +1,5 @@
-//! A generator of pseudo-random numbers whose sequence never changes between versions: splits and shuffles are named
-//! by their seed.
+//! A generator of pseudo-random numbers whose sequence never changes between versions: splits and shuffles
+//! are named by their seed.
 
 /// SplitMix64 (Steele, Lea & Flood 2014, <https://doi.org/10.1145/2660193.2660195>).
 #[derive(Debug, Clone)]
@@ -27,12 +27,14 @@ impl SplitMix64 {
         (self.next_u64() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Uniform among 0 … bound − 1 (bound > 0) by multiplication; the bias, below bound·2⁻⁶⁴, is beyond measuring.
+    /// Uniform among 0 … bound − 1 (bound > 0) by multiplication; the bias, below bound·2⁻⁶⁴, is beyond
+    /// measuring.
     pub fn below(&mut self, bound: usize) -> usize {
         ((u128::from(self.next_u64()) * bound as u128) >> 64) as usize
     }
 
-    /// Draws from the standard normal distribution, by the polar method of Marsaglia & Bray 1964, <https://doi.org/10.1137/1006063>.
+    /// Draws from the standard normal distribution, by the polar method of Marsaglia & Bray 1964,
+    /// <https://doi.org/10.1137/1006063>.
     pub fn normal(&mut self) -> f64 {
         loop {
             let (a, b) = (2.0 * self.uniform() - 1.0, 2.0 * self.uniform() - 1.0);

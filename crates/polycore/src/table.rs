@@ -1,9 +1,9 @@
 //! Tables of measured numbers, as programs and laboratories write them.
 //!
-//! [`Table::read`] finds out by itself how a file is written: its encoding (UTF-8, UTF-16, Latin-1), separator (tab, `;`,
-//! `,`, blanks), decimal sign, the line of headings below any lines of metadata, and a row of units. Headings are
-//! `name [unit]`, `name (unit)`, `name/unit` or `name` over a unit. What was found is said in one line
-//! ([`Table::describe`]), and stands in every error.
+//! [`Table::read`] finds out by itself how a file is written: its encoding (UTF-8, UTF-16, Latin-1),
+//! separator (tab, `;`, `,`, blanks), decimal sign, the line of headings below any lines of metadata, and a
+//! row of units. Headings are `name [unit]`, `name (unit)`, `name/unit` or `name` over a unit. What was found
+//! is said in one line ([`Table::describe`]), and stands in every error.
 //!
 //! ```
 //! use polycore::table::Table;
@@ -79,7 +79,8 @@ impl Table {
     /// Reads what a file holds.
     ///
     /// # Errors
-    /// What is no text, a table without headings, and a row that has another number of cells than the headings.
+    /// What is no text, a table without headings, and a row that has another number of cells than the
+    /// headings.
     pub fn parse(path: impl AsRef<Path>, bytes: Vec<u8>) -> Result<Self, Error> {
         let path = path.as_ref();
         let refuse = |line, what: &str, found: String, allowed: String| Error {
@@ -173,8 +174,8 @@ impl Table {
         self.headings.iter().position(|heading| heading.name == name)
     }
 
-    /// The columns of the first of some names that there is: exactly or, if none is, apart from capitals, dots and dashes;
-    /// single letters (t is a time, T a temperature) only exactly.
+    /// The columns of the first of some names that there is: exactly or, if none is, apart from capitals,
+    /// dots and dashes; single letters (t is a time, T a temperature) only exactly.
     pub fn matching(&self, names: &[&str]) -> Vec<usize> {
         let all = |test: &dyn Fn(&Heading) -> bool| -> Vec<usize> {
             (0..self.headings.len()).filter(|&i| test(&self.headings[i])).collect()

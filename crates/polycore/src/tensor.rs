@@ -2,12 +2,12 @@
 //!
 //! [`DeformationGradient`] is a 3×3 matrix that was checked: every component is finite and det F > 0.
 //! Everything else follows from it without further errors: Cauchy–Green tensors, invariants, principal
-//! stretches, and the conversions between the four [`StressMeasure`]s. Voigt vectors and 6×6 tangents, with their
-//! factor-2 rules, are in [`voigt`].
+//! stretches, and the conversions between the four [`StressMeasure`]s. Voigt vectors and 6×6 tangents, with
+//! their factor-2 rules, are in [`voigt`].
 //!
-//! Accuracy. The determinant is summed in doubled precision and the cofactors with fused multiply–add, so that
-//! neither loses digits to cancellation; the principal stretches come from a one-sided Jacobi decomposition of F
-//! itself (never of C, whose eigenvalues carry the square of the condition number).
+//! Accuracy. The determinant is summed in doubled precision and the cofactors with fused multiply–add, so
+//! that neither loses digits to cancellation; the principal stretches come from a one-sided Jacobi
+//! decomposition of F itself (never of C, whose eigenvalues carry the square of the condition number).
 //! Repeated stretches need no special case.
 
 pub mod deformation;

@@ -1,17 +1,19 @@
-//! Fields of one discretisation on another: from the hexahedra of a mesh to the particles of a body, and back, by the volume
-//! that cells and particles have in common.
+//! Fields of one discretisation on another: from the hexahedra of a mesh to the particles of a body, and
+//! back, by the volume that cells and particles have in common.
 //!
-//! A particle is an axis-parallel box. Each part that a cell and a box have in common has a volume V and a place, the natural
-//! coordinates of its middle in the cell. Then
+//! A particle is an axis-parallel box. Each part that a cell and a box have in common has a volume V and a
+//! place, the natural coordinates of its middle in the cell. Then
 //! - a field over cells gives a box Σ V v / Σ V,
-//! - a field over nodes gives it Σ V Σ_a N_a(place) v_a / Σ V, with the trilinear shape functions N_a of the cell,
+//! - a field over nodes gives it Σ V Σ_a N_a(place) v_a / Σ V, with the trilinear shape functions N_a of the
+//!   cell,
 //!
-//! and both keep the integral over everything covered. Cells that are axis-parallel boxes themselves are cut exactly: a product of
-//! linear functions has its mean over a box in the middle of that box, so that the second line is the mean of the
-//! interpolated field, and the value in the middle of the box where the field is linear and the box is covered. Any other hexahedron
-//! is replaced by Gauss points, two along each axis of each of its n³ equal pieces in natural coordinates, with pieces of at most
-//! half a box: their weights integrate a trilinear field over the cell exactly, and each point belongs to one box, so that
-//! integrals are kept, but which share a box has of a cell is as coarse as the points.
+//! and both keep the integral over everything covered. Cells that are axis-parallel boxes themselves are cut
+//! exactly: a product of linear functions has its mean over a box in the middle of that box, so that the
+//! second line is the mean of the interpolated field, and the value in the middle of the box where the field
+//! is linear and the box is covered. Any other hexahedron is replaced by Gauss points, two along each axis of
+//! each of its n³ equal pieces in natural coordinates, with pieces of at most half a box: their weights
+//! integrate a trilinear field over the cell exactly, and each point belongs to one box, so that integrals
+//! are kept, but which share a box has of a cell is as coarse as the points.
 
 use crate::Error;
 use crate::numerics::hexahedron::{CORNERS, shapes};
@@ -153,7 +155,8 @@ impl Overlap {
         Ok(self.means(|part| values[part.cell as usize]))
     }
 
-    /// Means over the boxes of a field over nodes, trilinear in each cell; `None` where the mesh does not reach.
+    /// Means over the boxes of a field over nodes, trilinear in each cell; `None` where the mesh does not
+    /// reach.
     ///
     /// # Errors
     /// [`Error::Data`]: another number of values than nodes.
@@ -182,8 +185,8 @@ impl Overlap {
         Ok(sums.into_iter().map(mean).collect())
     }
 
-    /// Values of nodes from a field over boxes: Σ V N_a v / Σ V N_a over the parts of all boxes, the lumped projection, which keeps
-    /// the integral Σ_a v_a ∫N_a dV; `None` where no box reaches.
+    /// Values of nodes from a field over boxes: Σ V N_a v / Σ V N_a over the parts of all boxes, the lumped
+    /// projection, which keeps the integral Σ_a v_a ∫N_a dV; `None` where no box reaches.
     ///
     /// # Errors
     /// [`Error::Data`]: another number of values than boxes.
@@ -227,8 +230,8 @@ fn fits(what: &str, count: usize, values: &[f64]) -> Result<(), Error> {
     Err(Error::Data { what: "a field to transfer".to_owned(), reason })
 }
 
-/// Volume of hexahedra and the integral of a field over their nodes, by two Gauss points along each axis; exact for the
-/// trilinear field.
+/// Volume of hexahedra and the integral of a field over their nodes, by two Gauss points along each axis;
+/// exact for the trilinear field.
 ///
 /// # Errors
 /// As [`Overlap::new`]; another number of values than nodes.

@@ -3,8 +3,9 @@
 //! A scene type declares `spacing: Length`; reading `"2 kg"` there fails with a message that names what was
 //! found and what is needed. Inside the solvers there are no units: [`Quantity::si`] gives the plain `f64`.
 //!
-//! Symbols, factors and dimensions come from [`uom`]; the grammar on top allows products (`N*mm`, `N·mm`, `N mm`),
-//! quotients (`J/(kg K)`), powers (`mm^2`, `mm²`, `s^-1`) and `u` for `µ`. `J/kg K` is ambiguous and refused.
+//! Symbols, factors and dimensions come from [`uom`]; the grammar on top allows products (`N*mm`, `N·mm`,
+//! `N mm`), quotients (`J/(kg K)`), powers (`mm^2`, `mm²`, `s^-1`) and `u` for `µ`. `J/kg K` is ambiguous and
+//! refused.
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -65,8 +66,8 @@ impl<D: Dimension> FromStr for Quantity<D> {
     /// Reads `NUMBER UNIT`.
     ///
     /// # Errors
-    /// Every departure from the grammar, an unknown unit, another dimension than `D`, and numbers that are not
-    /// finite or that over- or underflow in SI units.
+    /// Every departure from the grammar, an unknown unit, another dimension than `D`, and numbers that are
+    /// not finite or that over- or underflow in SI units.
     fn from_str(text: &str) -> Result<Self, UnitError> {
         let (number, unit) = grammar::split_number(text)?;
         if !number.is_finite() {
@@ -232,7 +233,8 @@ impl<D: Dimension> Visitor<'_> for QuantityVisitor<D> {
 }
 
 macro_rules! dimensions {
-    ($($(#[$doc:meta])* $alias:ident, $marker:ident: $exponents:expr, $name:literal, $unit:literal, $example:literal
+    ($($(#[$doc:meta])* $alias:ident, $marker:ident: $exponents:expr, $name:literal, $unit:literal,
+        $example:literal
         $(, $absolute:literal)?;)+) => {
         /// The marker types behind the aliases, one for each kind of quantity.
         pub mod dimension {
@@ -309,15 +311,20 @@ dimensions! {
     /// A rate or frequency.
     Rate, RateDimension: exponents!(frequency), "a rate", "1/s", "5e-5 /s";
     /// An absolute temperature; the only quantity that may be given in `degC`.
-    Temperature, TemperatureDimension: exponents!(thermodynamic_temperature), "a temperature", "K", "220 degC", true;
+    Temperature, TemperatureDimension: exponents!(thermodynamic_temperature),
+        "a temperature", "K", "220 degC", true;
     /// A difference of temperatures, in kelvin.
-    TemperatureDifference, TemperatureDifferenceDimension: exponents!(temperature_interval), "a temperature difference", "K", "5 K";
+    TemperatureDifference, TemperatureDifferenceDimension: exponents!(temperature_interval), "a temperature \
+        difference", "K", "5 K";
     /// A heating or cooling rate.
-    TemperatureRate, TemperatureRateDimension: [0, 0, -1, 0, 1, 0, 0, 0], "a temperature rate", "K/s", "10 K/min";
+    TemperatureRate, TemperatureRateDimension: [0, 0, -1, 0, 1, 0, 0, 0], "a temperature \
+        rate", "K/s", "10 K/min";
     /// A square of temperatures, as nucleation constants are.
-    SquaredTemperature, SquaredTemperatureDimension: [0, 0, 0, 0, 2, 0, 0, 0], "a squared temperature", "K^2", "136235 K^2";
+    SquaredTemperature, SquaredTemperatureDimension: [0, 0, 0, 0, 2, 0, 0, 0],
+        "a squared temperature", "K^2", "136235 K^2";
     /// A change per temperature.
-    PerTemperature, PerTemperatureDimension: [0, 0, 0, 0, -1, 0, 0, 0], "a number per temperature", "1/K", "0.965 1/K";
+    PerTemperature, PerTemperatureDimension: [0, 0, 0, 0, -1, 0, 0, 0], "a number per \
+        temperature", "1/K", "0.965 1/K";
     /// An energy per amount of substance.
     MolarEnergy, MolarEnergyDimension: exponents!(molar_energy), "a molar energy", "J/mol", "6270 J/mol";
     /// An energy (a torque has the same dimension).
@@ -327,21 +334,28 @@ dimensions! {
     /// A power per mass, as calorimeters measure it.
     SpecificPower, SpecificPowerDimension: [2, 0, -3, 0, 0, 0, 0, 0], "a power per mass", "W/kg", "1.5 W/g";
     /// An energy per area or force per length: fracture energy, surface tension; `N/mm` = 1000 J/m².
-    EnergyPerArea, EnergyPerAreaDimension: exponents!(surface_tension), "an energy per area", "J/m^2", "2.67 N/mm";
+    EnergyPerArea, EnergyPerAreaDimension: exponents!(surface_tension), "an energy per \
+        area", "J/m^2", "2.67 N/mm";
     /// A specific energy or latent heat.
-    SpecificEnergy, SpecificEnergyDimension: exponents!(available_energy), "an energy per mass", "J/kg", "104.5 J/g";
+    SpecificEnergy, SpecificEnergyDimension: exponents!(available_energy), "an energy per \
+        mass", "J/kg", "104.5 J/g";
     /// A specific heat capacity.
-    SpecificHeat, SpecificHeatDimension: exponents!(specific_heat_capacity), "a specific heat capacity", "J/(kg K)", "2200 J/(kg K)";
+    SpecificHeat, SpecificHeatDimension: exponents!(specific_heat_capacity), "a specific heat \
+        capacity", "J/(kg K)", "2200 J/(kg K)";
     /// A thermal conductivity.
-    Conductivity, ConductivityDimension: exponents!(thermal_conductivity), "a thermal conductivity", "W/(m K)", "0.25 W/(m K)";
+    Conductivity, ConductivityDimension: exponents!(thermal_conductivity),
+        "a thermal conductivity", "W/(m K)", "0.25 W/(m K)";
     /// A film coefficient of heat transfer.
-    HeatTransfer, HeatTransferDimension: exponents!(heat_transfer), "a heat transfer coefficient", "W/(m^2 K)", "50 W/(m^2 K)";
+    HeatTransfer, HeatTransferDimension: exponents!(heat_transfer), "a heat transfer \
+        coefficient", "W/(m^2 K)", "50 W/(m^2 K)";
     /// A heat flux.
     HeatFlux, HeatFluxDimension: exponents!(heat_flux_density), "a heat flux", "W/m^2", "500 W/m^2";
     /// Heat released per volume and time.
-    PowerDensity, PowerDensityDimension: [-1, 1, -3, 0, 0, 0, 0, 0], "a power per volume", "W/m^3", "1 W/mm^3";
+    PowerDensity, PowerDensityDimension: [-1, 1, -3, 0, 0, 0, 0, 0], "a power per \
+        volume", "W/m^3", "1 W/mm^3";
     /// A thermal diffusivity or kinematic viscosity.
-    Diffusivity, DiffusivityDimension: exponents!(diffusion_coefficient), "a diffusivity", "m^2/s", "0.11 mm^2/s";
+    Diffusivity, DiffusivityDimension: exponents!(diffusion_coefficient),
+        "a diffusivity", "m^2/s", "0.11 mm^2/s";
     /// A plane angle; needs its unit.
     Angle, AngleDimension: [0, 0, 0, 0, 0, 0, 0, 1], "an angle", "rad", "90 deg";
 }

@@ -14,7 +14,8 @@ fn ulps(value: f64, reference: f64) -> f64 {
 
 #[test]
 fn every_function_within_its_documented_error() {
-    // in ulp: the table in the documentation of `polycore::langevin`; the tabulated reference is itself rounded (1/2)
+    // in ulp: the table in the documentation of `polycore::langevin`; the tabulated reference is itself
+    // rounded (1/2)
     let functions: [(&str, ScalarFunction, f64); 8] = [
         ("langevin", langevin::langevin, 4.0),
         ("derivative", langevin::derivative, 4.0),

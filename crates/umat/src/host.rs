@@ -44,14 +44,17 @@ fn states(found: usize) {
     }
 }
 
-/// UMAT as Abaqus declares it (*Abaqus User Subroutines Guide*, 1.1.44): three normal and three shear stresses. Rubbers take F from `DFGRD1`, prints
-/// the strains `STRAN` + `DSTRAN`. Where a law has no stress, `PNEWDT` asks for a quarter of the increment.
+/// UMAT as Abaqus declares it (*Abaqus User Subroutines Guide*, 1.1.44): three normal and three shear
+/// stresses. Rubbers take F from `DFGRD1`, prints the strains `STRAN` + `DSTRAN`. Where a law has no stress,
+/// `PNEWDT` asks for a quarter of the increment.
 ///
-/// Energies are those of a unit of the deformed volume, in the host's unit of stress: `SSE` is W/J of a rubber; of a print the elastic energy,
-/// beside what crystals took as they grew and melted (`SPD`) and what relaxed (`SCD`).
+/// Energies are those of a unit of the deformed volume, in the host's unit of stress: `SSE` is W/J of a
+/// rubber; of a print the elastic energy, beside what crystals took as they grew and melted (`SPD`) and what
+/// relaxed (`SCD`).
 ///
 /// # Safety
-/// As in Fortran: every pointer is valid for the length that `NTENS`, `NSTATV` and `NPROPS` tell, and nothing else refers to what is written.
+/// As in Fortran: every pointer is valid for the length that `NTENS`, `NSTATV` and `NPROPS` tell, and nothing
+/// else refers to what is written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn umat_(
     stress: *mut f64,
@@ -157,10 +160,12 @@ fn turned(state: &mut [f64], turn: &[f64; 9]) {
     }
 }
 
-/// UMAT_USER of CalculiX 2.20, materials whose name begins with `USER`: Green's strain (tensor shears) in, S and dS/dE out; no `*ORIENTATION`.
+/// UMAT_USER of CalculiX 2.20, materials whose name begins with `USER`: Green's strain (tensor shears) in, S
+/// and dS/dE out; no `*ORIENTATION`.
 ///
 /// # Safety
-/// As in Fortran: every pointer is valid for what CalculiX declares, and nothing else refers to what is written.
+/// As in Fortran: every pointer is valid for what CalculiX declares, and nothing else refers to what is
+/// written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn umat_user_(
     amat: *const c_char,

@@ -1,7 +1,9 @@
-//! Materials of this workspace as UMAT: `umat_`, as Abaqus calls it, and `umat_user_`, CalculiX' own, in `libumat`.
+//! Materials of this workspace as UMAT: `umat_`, as Abaqus calls it, and `umat_user_`, CalculiX' own, in
+//! `libumat`.
 //!
-//! The name of the material in the input of the host chooses: a hyperelastic law of [`polycore`] (`EIGHT_CHAIN`, `NEO_HOOKEAN`, …, [`RubberMaterial`])
-//! or the solidifying body of prints (`PRINTED_PA12`, [`Print`]); CalculiX wants `USER_` before it. `umatht_` is in the library, too.
+//! The name of the material in the input of the host chooses: a hyperelastic law of [`polycore`]
+//! (`EIGHT_CHAIN`, `NEO_HOOKEAN`, …, [`RubberMaterial`]) or the solidifying body of prints (`PRINTED_PA12`,
+//! [`Print`]); CalculiX wants `USER_` before it. `umatht_` is in the library, too.
 //!
 //! ```
 //! use umat::RubberMaterial;
@@ -49,7 +51,8 @@ pub enum Material {
 }
 
 impl Material {
-    /// The material of a name: that of a law, in capitals or not, with `_` or `-`, perhaps `USER_` before it and `_…` behind it.
+    /// The material of a name: that of a law, in capitals or not, with `_` or `-`, perhaps `USER_` before it
+    /// and `_…` behind it.
     ///
     /// # Errors
     /// A name that begins with no material's; constants out of range, too few or too many.

@@ -5,8 +5,8 @@ use crystfem::mechanics::SolidifyingMaxwell;
 use polycore::tensor::voigt::{Voigt, Voigt6x6};
 use umatht::{State, ThermalIncrement, respond};
 
-/// PA12 that crystallizes, shrinks and relaxes ([`SolidifyingMaxwell::pa12`]): α by its own integration of the temperature that the host
-/// gives. Strains are small.
+/// PA12 that crystallizes, shrinks and relaxes ([`SolidifyingMaxwell::pa12`]): α by its own integration of
+/// the temperature that the host gives. Strains are small.
 pub struct Print {
     body: SolidifyingMaxwell,
     /// Constants of [`umatht::respond`].
@@ -17,7 +17,8 @@ pub struct Print {
     unit: f64,
 }
 
-/// Work of an increment by destination, in the host's unit of stress; the three together are the work of the stress on the strain without the free strain.
+/// Work of an increment by destination, in the host's unit of stress; the three together are the work of the
+/// stress on the strain without the free strain.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Dissipation {
     /// Increase of the elastic energy.
@@ -34,11 +35,13 @@ const SIX: usize = 6;
 impl Print {
     /// Name in the input of a host, without `USER_`.
     pub const NAME: &'static str = "printed-pa12";
-    /// z, α, T (K), the total strain at the end (6), and the elastic strains of the branches (6 × 6); all 0 at birth.
+    /// z, α, T (K), the total strain at the end (6), and the elastic strains of the branches (6 × 6); all 0
+    /// at birth.
     pub const STATES: usize = 9 + 6 * SIX;
 
-    /// Constants: column of Table 4.1 (1 or 2), absolute zero (0 in kelvin, 273.15 in °C), temperature of birth in the host's degrees (where
-    /// strains begin), crystallinity X∞ at α = 1, and Pa in the host's unit of stress (1e6 for MPa).
+    /// Constants: column of Table 4.1 (1 or 2), absolute zero (0 in kelvin, 273.15 in °C), temperature of
+    /// birth in the host's degrees (where strains begin), crystallinity X∞ at α = 1, and Pa in the host's
+    /// unit of stress (1e6 for MPa).
     ///
     /// # Errors
     /// Constants out of range, too few or too many.
@@ -66,8 +69,9 @@ impl Print {
         Ok(answer.map_err(|error| Error::new(error.name, error.found, error.allowed))?.state)
     }
 
-    /// Stress, the tangent and energies after an increment to a temperature, in a time, s; `strain` gives the total strain at the end from that at the
-    /// start, shears doubled. Reads `state`, writes `new`, both of [`Self::STATES`] numbers.
+    /// Stress, the tangent and energies after an increment to a temperature, in a time, s; `strain` gives the
+    /// total strain at the end from that at the start, shears doubled. Reads `state`, writes `new`, both of
+    /// [`Self::STATES`] numbers.
     ///
     /// # Errors
     /// Temperatures below absolute zero.
@@ -136,7 +140,8 @@ mod tests {
     use super::*;
     use crystfem::exact::Wall;
 
-    /// Advances a point of a plate: its strain in the plane is given, σ₃₃ = 0. Gives the stress in the plane and its slope.
+    /// Advances a point of a plate: its strain in the plane is given, σ₃₃ = 0. Gives the stress in the plane
+    /// and its slope.
     fn point(print: &Print, state: &[f64], new: &mut [f64], t: f64, dt: f64, plane: f64) -> (f64, f64) {
         let mut advance = |third: f64| {
             print.advance(state, new, t, dt, |_| Voigt::new(plane, plane, third, 0.0, 0.0, 0.0)).unwrap()
@@ -148,7 +153,8 @@ mod tests {
         (stress[0], tangent[(0, 0)] + tangent[(0, 1)] - coupled)
     }
 
-    /// A plate of 4 mm, 220 °C to 25 °C, Bi = 1 on both faces, after 600 s: `docs/reference/print/plate.py`, MPa.
+    /// A plate of 4 mm, 220 °C to 25 °C, Bi = 1 on both faces, after 600 s: `docs/reference/print/plate.py`,
+    /// MPa.
     #[test]
     fn a_plate_cools() {
         let print = Print::new(&[1.0, 273.15, 220.0, 0.25, 1e6]).unwrap();

@@ -17,10 +17,12 @@ pub(crate) fn names() -> Vec<&'static str> {
 }
 
 impl RubberMaterial {
-    /// A law by its key; constants are the bulk modulus K of small strains, then the parameters of the law, stresses in the host's unit.
+    /// A law by its key; constants are the bulk modulus K of small strains, then the parameters of the law,
+    /// stresses in the host's unit.
     ///
     /// # Errors
-    /// An unknown key; constants out of range, too few or too many; K below that of the law without a volumetric term.
+    /// An unknown key; constants out of range, too few or too many; K below that of the law without a
+    /// volumetric term.
     pub fn new(key: &str, constants: &[f64]) -> Result<Self, Error> {
         let wrong = |error: polycore::constitutive::Error| Error::new(key, format!("{constants:?}"), error);
         let descriptor = model(key).map_err(wrong)?;
@@ -50,7 +52,8 @@ impl RubberMaterial {
         Ok((prediction.stress, prediction.tangent.unwrap_or_default()))
     }
 
-    /// Cauchy stress and the tangent of its Jaumann rate ([`voigt::jaumann_tangent`]) at F, nine numbers column by column.
+    /// Cauchy stress and the tangent of its Jaumann rate ([`voigt::jaumann_tangent`]) at F, nine numbers
+    /// column by column.
     ///
     /// # Errors
     /// As [`Self::material`]; det F ≤ 0.
@@ -58,7 +61,8 @@ impl RubberMaterial {
         self.stored(f).map(|(stress, tangent, _)| (stress, tangent))
     }
 
-    /// Computes the Cauchy stress and tangent as [`Self::cauchy`], and the stored energy W/J per deformed volume, in the host's unit of stress.
+    /// Computes the Cauchy stress and tangent as [`Self::cauchy`], and the stored energy W/J per deformed
+    /// volume, in the host's unit of stress.
     ///
     /// # Errors
     /// As [`Self::cauchy`].

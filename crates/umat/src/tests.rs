@@ -155,7 +155,8 @@ fn stored_energy_is_work() {
     }
 }
 
-/// Once its crystals are grown, the work on a print at one temperature is stored or relaxed: no strain is free, and none is lost.
+/// Once its crystals are grown, the work on a print at one temperature is stored or relaxed: no strain is
+/// free, and none is lost.
 #[test]
 fn energies_of_a_print_close() {
     let constants = [1.0, 273.15, 180.0, 0.25, 1e6];

@@ -114,11 +114,13 @@ impl HostMaterial {
                 (own, melts.then(|| Melting::new(sharpness, shape, peak)).transpose()?)
             }
             (0.0, &[_, _, _, _, _, _, _, _]) => {
-                let allowed = "15 with `kinetics` 0: k_m in 1/K, d and T_p in K of melting are constants 13 to 15, or 0, 0, 0 for crystals that never melt";
+                let allowed = "15 with `kinetics` 0: k_m in 1/K, d and T_p in K of melting are constants 13 \
+                               to 15, or 0, 0, 0 for crystals that never melt";
                 return Err(Error { name: "constants", found: 12.0, allowed: allowed.into() });
             }
             _ => {
-                let allowed = "1 or 2, a column of Table 4.1 (PA12); 0 with constants 7 to 15; 3 with these in a file (from a host only)";
+                let allowed = "1 or 2, a column of Table 4.1 (PA12); 0 with constants 7 to 15; 3 with these \
+                               in a file (from a host only)";
                 return Err(wrong(3, column, allowed));
             }
         };

@@ -21,8 +21,8 @@ pub fn is_asked(list: &[f64]) -> bool {
     list.get(3) == Some(&IN_FILE)
 }
 
-/// The whole list of constants of a material: 7 to 15 from `name.umatht` in a folder, the host's name of the material in small letters, a
-/// line `growth_rate = 37869.0` (TOML) for each.
+/// The whole list of constants of a material: 7 to 15 from `name.umatht` in a folder, the host's name of the
+/// material in small letters, a line `growth_rate = 37869.0` (TOML) for each.
 ///
 /// # Errors
 /// A file that cannot be read, a missing or unknown name, a value that is no number.
@@ -70,8 +70,10 @@ mod tests {
 
     #[test]
     fn a_file_has_the_rest() {
-        let text = "growth_rate = 37869\nnucleation = 136235.0\nactivation_energy = 6270.0\nequilibrium_melting = 466.35\n\
-                    frozen = 294.15\navrami_exponent = 2.678\nmelting_sharpness = 0.965\nmelting_shape = 8.584 # d\nmelting_peak = 450\n";
+        let text = "growth_rate = 37869\nnucleation = 136235.0\nactivation_energy = \
+                    6270.0\nequilibrium_melting = 466.35\n\
+                    frozen = 294.15\navrami_exponent = 2.678\nmelting_sharpness = 0.965\n\
+                    melting_shape = 8.584 # d\nmelting_peak = 450\n";
         assert_eq!(
             parse(text).unwrap(),
             [37869.0, 136_235.0, 6270.0, 466.35, 294.15, 2.678, 0.965, 8.584, 450.0]

@@ -7,13 +7,13 @@ use std::path::Path;
 /// Length of a name in Fortran.
 const NAME: usize = 80;
 
-/// UMATHT as Abaqus declares it; CalculiX appends arguments, which are left alone. `STATEV` are the first three of
-/// [`State`], and, where there is a fourth, the latent heat that crystals release per mass and time; `PROPS` are the constants of
-/// [`NAMES`]. Wrong numbers end the program with a line that names them.
+/// UMATHT as Abaqus declares it; CalculiX appends arguments, which are left alone. `STATEV` are the first
+/// three of [`State`], and, where there is a fourth, the latent heat that crystals release per mass and time;
+/// `PROPS` are the constants of [`NAMES`]. Wrong numbers end the program with a line that names them.
 ///
 /// # Safety
-/// As in Fortran: every pointer is valid for the length that `NTGRD`, `NSTATV` and `NPROPS` tell, and nothing else refers
-/// to what is written.
+/// As in Fortran: every pointer is valid for the length that `NTGRD`, `NSTATV` and `NPROPS` tell, and nothing
+/// else refers to what is written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn umatht_(
     u: *mut f64,
@@ -106,8 +106,8 @@ fn end(message: &str) -> ! {
     std::process::exit(2)
 }
 
-/// `int crystfem_respond(constants, count, increment, state, answer)`: 0, or 1 where a number is out of range, which is then
-/// printed.
+/// `int crystfem_respond(constants, count, increment, state, answer)`: 0, or 1 where a number is out of
+/// range, which is then printed.
 ///
 /// # Safety
 /// `constants` points to `count` numbers, the others to what `include/crystfem.h` declares.

@@ -1,15 +1,16 @@
-//! The semicrystalline material of [`crystfem`] in other programs: `umatht_`, as Abaqus and CalculiX call it, and
-//! `crystfem_respond` for C (`include/crystfem.h`).
+//! The semicrystalline material of [`crystfem`] in other programs: `umatht_`, as Abaqus and CalculiX call it,
+//! and `crystfem_respond` for C (`include/crystfem.h`).
 //!
-//! [`respond`] is the material: a pure function of constants, an increment and the state at its start. The host keeps the
-//! state; whatever increment it repeats or cuts back gets the same answer.
+//! [`respond`] is the material: a pure function of constants, an increment and the state at its start. The
+//! host keeps the state; whatever increment it repeats or cuts back gets the same answer.
 //!
 //! ```
 //! use umatht::{ThermalIncrement, NAMES, State, respond};
 //!
 //! // k, c, ΔH·X∞, column of Table 4.1; 1 s of cooling from 150 °C at 10 K/min
 //! let constants = [0.25, 2200.0, 0.0, 1.0];
-//! let at = ThermalIncrement { temperature: 423.15, change: -10.0 / 60.0, time: 1.0, gradient: [100.0, 0.0, 0.0] };
+//! let (change, gradient) = (-10.0 / 60.0, [100.0, 0.0, 0.0]);
+//! let at = ThermalIncrement { temperature: 423.15, change, time: 1.0, gradient };
 //! let answer = respond(&constants, &at, &State::default())?;
 //! assert!(answer.state.degree > 0.0 && answer.flux[0] == -25.0);
 //! assert_eq!(NAMES[3], "kinetics");
@@ -137,7 +138,8 @@ mod tests {
         500.0,
     ];
 
-    /// Crystals melt where their own constants say: at 460 K those of PA12 are gone, others are there, or never melt.
+    /// Crystals melt where their own constants say: at 460 K those of PA12 are gone, others are there, or
+    /// never melt.
     #[test]
     fn melting_belongs_to_the_constants() {
         let hot = ThermalIncrement { gradient: [0.0; 3], ..at(440.0, 20.0) };
@@ -154,7 +156,8 @@ mod tests {
         assert_eq!(degree(&as_pa12), pa12);
     }
 
-    /// The start is that of CalculiX's state, the sign of k that of its conductivity, the zero that of the host.
+    /// The start is that of CalculiX's state, the sign of k that of its conductivity, the zero that of the
+    /// host.
     #[test]
     fn hosts_differ() {
         let celsius = [0.25, 2200.0, 52e3, 1.0, 273.15, 0.0];

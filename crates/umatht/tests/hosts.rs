@@ -1,7 +1,7 @@
 //! The library called as hosts call it: from C, from Fortran in the order of Abaqus, and in CalculiX.
 //!
-//! Temperatures at which α reaches 0.01, 0.5, 0.99 on cooling are those of `shared/formulation.md`, which an independent
-//! program computed.
+//! Temperatures at which α reaches 0.01, 0.5, 0.99 on cooling are those of `shared/formulation.md`, which an
+//! independent program computed.
 
 use evidence::hosts::{self, run, there};
 use std::path::{Path, PathBuf};
@@ -63,7 +63,8 @@ int main(void) {
     constants[crystfem_constant(\"kinetics\")] = 1;
     constants[crystfem_constant(\"absolute_zero\")] = 273.15;
     if (crystfem_respond(constants, 5, at, &state, &answer)) return 1;
-    printf(\"%.17g %.17g %.17g %.17g %.17g %.17g\", answer.state.z, answer.state.degree, answer.energy, answer.slope,
+    printf(\"%.17g %.17g %.17g %.17g %.17g %.17g\", answer.state.z, answer.state.degree, answer.energy, \
+             answer.slope,
            answer.flux[2], answer.conductivity[8]);
     constants[0] = -1;
     wrong = crystfem_respond(constants, 5, at, &state, &answer);
@@ -72,7 +73,8 @@ int main(void) {
 }
 ";
 
-/// Calls in Abaqus' order: U and the state from the start of the increment in every iteration, increments that are cut back and tried again; prescribed cooling, and a lumped body with latent heat.
+/// Calls in Abaqus' order: U and the state from the start of the increment in every iteration, increments
+/// that are cut back and tried again; prescribed cooling, and a lumped body with latent heat.
 #[test]
 fn follows_the_order_of_abaqus() {
     if !there("gfortran") {
@@ -101,7 +103,8 @@ fn follows_the_order_of_abaqus() {
 const FORTRAN: &str = "program main
     implicit none
     integer, parameter :: dp = kind(1d0)
-    real(dp) :: u, dudt, dudg(3), flux(3), dfdt(3), dfdg(3, 3), statev(3), temp, dtemp, dtime, props(4), pnewdt, rate
+    real(dp) :: u, dudt, dudg(3), flux(3), dfdt(3), dfdg(3, 3), statev(3)
+    real(dp) :: temp, dtemp, dtime, props(4), pnewdt, rate
     real(dp) :: u0, old(3), residual, time(2), none(3), levels(3) = [0.01_dp, 0.5_dp, 0.99_dp]
     character(len=32) :: word
     integer :: increment, iteration, level
@@ -151,7 +154,8 @@ contains
         statev = old
         u = u0
         pnewdt = 1
-        call umatht(u, dudt, dudg, flux, dfdt, dfdg, statev, temp, dtemp, none, time, step, none, none, repeat('x', 80), 3, 3, &
+        call umatht(u, dudt, dudg, flux, dfdt, dfdg, statev, temp, dtemp, none, time, step, none, none, &
+            repeat('x', 80), 3, 3, &
             props, 4, none, pnewdt, 1, 1, 1, 1, 1, increment)
     end subroutine material
 end program main
@@ -175,11 +179,16 @@ fn crystallizes_in_calculix() {
         let nodes: Vec<String> = (1..=8).map(|j| (4 * k + j).to_string()).collect();
         deck += &format!("{},{}\n", k + 1, nodes.join(","));
     }
-    // one end from 200 °C to 120 °C at 10 K/min in steps of 0.1 K; the others 40 µm away at most follow within 1 mK
-    deck += "*MATERIAL, NAME=PA12\n*USER MATERIAL, TYPE=THERMAL, CONSTANTS=6\n0.25, 2200., 0., 1., 0., 1.\n*SPECIFIC HEAT\n2200.\n*DENSITY\n1010.\n\
-             *DEPVAR\n3\n*SOLID SECTION, ELSET=BLOCK, MATERIAL=PA12\n*INITIAL CONDITIONS, TYPE=TEMPERATURE\nALL, 473.15\n\
-             *AMPLITUDE, NAME=COOL\n0., 473.15, 480., 393.15\n*STEP, INC=2000\n*HEAT TRANSFER, DIRECT\n0.6, 480.\n\
-             *BOUNDARY, AMPLITUDE=COOL\n1, 11, 11, 1.\n2, 11, 11, 1.\n3, 11, 11, 1.\n4, 11, 11, 1.\n*NODE PRINT, NSET=ALL, FREQUENCY=1\nNT\n*EL PRINT, ELSET=BLOCK, FREQUENCY=1\nSDV\n*END STEP\n";
+    // one end from 200 °C to 120 °C at 10 K/min in steps of 0.1 K; the others 40 µm away at most follow
+    // within 1 mK
+    deck += "*MATERIAL, NAME=PA12\n*USER MATERIAL, TYPE=THERMAL, CONSTANTS=6\n0.25, 2200., 0., 1., 0., \
+             1.\n*SPECIFIC HEAT\n2200.\n*DENSITY\n1010.\n\
+             *DEPVAR\n3\n*SOLID SECTION, ELSET=BLOCK, MATERIAL=PA12\n*INITIAL CONDITIONS, TYPE=TEMPERATURE\n\
+             ALL, 473.15\n\
+             *AMPLITUDE, NAME=COOL\n0., 473.15, 480., 393.15\n*STEP, INC=2000\n*HEAT TRANSFER, DIRECT\n\
+             0.6, 480.\n\
+             *BOUNDARY, AMPLITUDE=COOL\n1, 11, 11, 1.\n2, 11, 11, 1.\n3, 11, 11, 1.\n4, 11, 11, 1.\n\
+             *NODE PRINT, NSET=ALL, FREQUENCY=1\nNT\n*EL PRINT, ELSET=BLOCK, FREQUENCY=1\nSDV\n*END STEP\n";
     let (_, results) = hosts::run_calculix(&program, directory.path(), &deck);
     let (mut before, mut found) = ((473.15, 0.0), Vec::new());
     for block in results.split("internal state variables").skip(1) {

@@ -15,7 +15,8 @@ const HEIGHT: f64 = 0.5e-3;
 const INTERVAL: f64 = 10.0;
 /// ΔH·X∞, J/kg.
 const LATENT: f64 = 52_250.0;
-/// A layer lies on a film so thin that it neither insulates nor conducts along it: so its nodes are its own, and a birth keeps its energy.
+/// A layer lies on a film so thin that it neither insulates nor conducts along it: so its nodes are its own,
+/// and a birth keeps its energy.
 const FILM: f64 = 1e-7;
 const HALF: [f64; 2] = [2e-3, 1e-3];
 
@@ -49,7 +50,8 @@ fn ours(latent: bool) -> Vec<Vec<Option<f64>>> {
         .collect()
 }
 
-/// The layer of an element, from 0, and the numbers of its nodes in CalculiX: a node between two layers is two.
+/// The layer of an element, from 0, and the numbers of its nodes in CalculiX: a node between two layers is
+/// two.
 fn element(mesh: &Mesh, nodes: &[u32; 8]) -> (usize, [usize; 8]) {
     let middle = nodes.iter().map(|&node| mesh.points[node as usize][2]).sum::<f64>() / 8.0;
     let layer = (middle / HEIGHT) as usize;
@@ -115,10 +117,14 @@ fn deck(mesh: &Mesh, latent: bool) -> String {
     };
     writeln!(
         text,
-        "{films}*ELSET, ELSET=BAR\n{}*ELSET, ELSET=FILMS\n{}*MATERIAL, NAME=PA12\n*USER MATERIAL, TYPE=THERMAL, CONSTANTS=6\n\
-         0.25, 2200., {LATENT}, 1., 0., 1.\n*SPECIFIC HEAT\n2200.\n*DENSITY\n1010.\n*DEPVAR\n4\n*SOLID SECTION, ELSET=BAR, MATERIAL=PA12\n\
-         *MATERIAL, NAME=FILM\n*CONDUCTIVITY\n1.\n*SPECIFIC HEAT\n1.\n*DENSITY\n1.\n*SOLID SECTION, ELSET=FILMS, MATERIAL=FILM\n\
-         *INITIAL CONDITIONS, TYPE=TEMPERATURE\nALL, 493.15\n*AMPLITUDE, NAME=ONE\n0., 1., 1e6, 1.\n*NSET, NSET=BOTTOM",
+        "{films}*ELSET, ELSET=BAR\n{}*ELSET, ELSET=FILMS\n{}*MATERIAL, NAME=PA12\n*USER MATERIAL, \
+         TYPE=THERMAL, CONSTANTS=6\n\
+         0.25, 2200., {LATENT}, 1., 0., 1.\n*SPECIFIC HEAT\n2200.\n*DENSITY\n1010.\n*DEPVAR\n4\n\
+         *SOLID SECTION, ELSET=BAR, MATERIAL=PA12\n\
+         *MATERIAL, NAME=FILM\n*CONDUCTIVITY\n1.\n*SPECIFIC HEAT\n1.\n*DENSITY\n1.\n\
+         *SOLID SECTION, ELSET=FILMS, MATERIAL=FILM\n\
+         *INITIAL CONDITIONS, TYPE=TEMPERATURE\nALL, 493.15\n*AMPLITUDE, NAME=ONE\n0., 1., 1e6, 1.\n\
+         *NSET, NSET=BOTTOM",
         sets("L", 0),
         sets("F", 1)
     )
@@ -129,7 +135,13 @@ fn deck(mesh: &Mesh, latent: bool) -> String {
     for layer in 0..LAYERS {
         for (phase, (step, duration)) in [(0.005, 0.5), (0.025, INTERVAL - 0.5)].into_iter().enumerate() {
             let count = (duration / step).round() as usize;
-            writeln!(text, "*STEP, INC={}\n*HEAT TRANSFER, DIRECT\n{step}, {duration}\n*CONTROLS, PARAMETERS=FIELD\n1e-6, 1e-4, , , 1e-6", count + 1).unwrap();
+            writeln!(
+                text,
+                "*STEP, INC={}\n*HEAT TRANSFER, DIRECT\n{step}, {duration}\n*CONTROLS, \
+                            PARAMETERS=FIELD\n1e-6, 1e-4, , , 1e-6",
+                count + 1
+            )
+            .unwrap();
             if (layer, phase) == (0, 0) {
                 writeln!(text, "*MODEL CHANGE, TYPE=ELEMENT, REMOVE\n{}{}", sets("L", 1), sets("F", 1))
                     .unwrap();
@@ -190,7 +202,8 @@ fn node_by_node() {
     let change = pairs().fold(0.0_f64, |most, (without, with)| most.max(with - without));
     pairs().for_each(|(_, with)| warmest = warmest.max(with - 353.15));
     eprintln!("latent heat changes {change} K of {warmest} K; CalculiX is off by {off} K");
-    // with steps twice as long 0.16 K, which is first order; at its end the last layer is 29 K above the chamber
+    // with steps twice as long 0.16 K, which is first order; at its end the last layer is 29 K above the
+    // chamber
     evidence::at_most("printed bar in CalculiX, K", off, 0.15);
     evidence::at_most("printed bar in CalculiX, of what latent heat changes", off / change, 0.03);
 }

@@ -14,7 +14,8 @@ use crate::workspace::Repository;
 
 /// Steps of a whole run.
 pub const STEPS: u32 = 20;
-/// Elements along an edge of the largest brick that other programs solve, and of the largest that takes them seconds.
+/// Elements along an edge of the largest brick that other programs solve, and of the largest that takes them
+/// seconds.
 const LARGEST: usize = 45;
 const SHORT: usize = 26;
 /// Turns, of which medians count; more of what is short.
@@ -23,10 +24,12 @@ const SHORT_ROUNDS: usize = 5;
 /// Displacement of inner nodes of the distorted brick, over its edge.
 const DISTORTION: &str = "0.1";
 
-/// scikit-fem's mean temperature at 20 000 nodes after 20 steps, K (formulation.md; printed to 8 digits after the point).
+/// scikit-fem's mean temperature at 20 000 nodes after 20 steps, K (formulation.md; printed to 8 digits after
+/// the point).
 const MEAN: (usize, f64) = (26, 476.763_119_07);
 const SAME_MEAN: f64 = 1e-7;
-/// Nodes agree up to here, K: what Newton's iterations leave, and half of the last digit that CalculiX prints.
+/// Nodes agree up to here, K: what Newton's iterations leave, and half of the last digit that CalculiX
+/// prints.
 const SAME_SCIKIT_FEM: f64 = 1e-5;
 const SAME_CALCULIX: f64 = 1e-4;
 
@@ -102,7 +105,8 @@ pub fn run(
     let table = runs.table();
     let passed = runs.passed(&mut notes);
     let text = format!(
-        "Brick of 20 mm{}, film and radiation, {STEPS} steps of 0.5 s by backward Euler, one thread; programs in turns, \
+        "Brick of 20 mm{}, film and radiation, {STEPS} steps of 0.5 s by backward Euler, one thread; \
+         programs in turns, \
          medians of {ROUNDS}, up to {SHORT}³ elements of {SHORT_ROUNDS}\n{table}{notes}",
         if distorted { ", inner nodes moved by up to 2 mm: no two elements equal" } else { "" }
     );

@@ -59,10 +59,12 @@ impl CalculixMesh {
             format!("*INCLUDE,INPUT={}\n*NSET,NSET=NALL,GENERATE\n1,{},1\n", self.file, self.nodes);
         deck += "*MATERIAL,NAME=PA12\n*CONDUCTIVITY\n0.25\n*DENSITY\n1010\n*SPECIFIC HEAT\n2200\n\
                  *PHYSICAL CONSTANTS,ABSOLUTE ZERO=0,STEFAN BOLTZMANN=5.670374419e-8\n\
-                 *SOLID SECTION,ELSET=brick,MATERIAL=PA12\n*INITIAL CONDITIONS,TYPE=TEMPERATURE\nNALL,493.15\n";
+                 *SOLID SECTION,ELSET=brick,MATERIAL=PA12\n*INITIAL CONDITIONS,TYPE=TEMPERATURE\n\
+                 NALL,493.15\n";
         let _ = write!(
             deck,
-            "*STEP,INC=100000\n*HEAT TRANSFER,DIRECT,SOLVER={solver}\n0.5,{}\n*BOUNDARY\nbottom,11,11,353.15\n\
+            "*STEP,INC=100000\n*HEAT \
+             TRANSFER,DIRECT,SOLVER={solver}\n0.5,{}\n*BOUNDARY\nbottom,11,11,353.15\n\
              *FILM\n{film}*RADIATE\n{radiation}*NODE PRINT,NSET=NALL,FREQUENCY={steps}\nNT\n*END STEP\n",
             0.5 * f64::from(steps)
         );
@@ -135,7 +137,8 @@ mod tests {
 
     #[test]
     fn decks_and_tables() {
-        let text = "*NODE\n1,0,0,0\n*SURFACE,NAME=bottom,TYPE=ELEMENT\n1,S1\n*SURFACE,NAME=top,TYPE=ELEMENT\n1,S2\n7,S2\n";
+        let text = "*NODE\n1,0,0,0\n*SURFACE,NAME=bottom,TYPE=ELEMENT\n1,S1\n\
+                    *SURFACE,NAME=top,TYPE=ELEMENT\n1,S2\n7,S2\n";
         let mesh = CalculixMesh::new("brick.inp", text, 8);
         let deck = mesh.deck(20, "SPOOLES");
         assert!(

@@ -1,5 +1,5 @@
-//! `crystfem`: error against run time of its kinetics, time integrators and linear solvers; then the [`brick`], on equal elements and on
-//! a distorted mesh.
+//! `crystfem`: error against run time of its kinetics, time integrators and linear solvers; then the
+//! [`brick`], on equal elements and on a distorted mesh.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,18 +11,20 @@ use super::{Row, brick, external, write};
 use crate::table::TextTable;
 use crate::workspace::Repository;
 
-/// Elements along an edge of the brick unless the user gives others: 20 000, 100 000, 300 000, 1 000 000 nodes.
+/// Elements along an edge of the brick unless the user gives others: 20 000, 100 000, 300 000, 1 000 000
+/// nodes.
 const EDGES: &str = "26,45,66,99";
 
-/// The parts with other programs: the brick, and the same with inner nodes moved, so that no two elements are equal.
+/// The parts with other programs: the brick, and the same with inner nodes moved, so that no two elements are
+/// equal.
 const BRICK: &str = "brick";
 const DISTORTED: &str = "distorted";
 
 /// Curve: its name, and the measurements at each step length or tolerance.
 type BenchCurve = (String, Vec<(String, BTreeMap<String, f64>)>);
 
-/// Rows, tables, and whether other programs agree on the brick. `arguments` are names of parts (default: all) and edges
-/// of the brick. Rows and pictures of each part go to `folder`.
+/// Rows, tables, and whether other programs agree on the brick. `arguments` are names of parts (default: all)
+/// and edges of the brick. Rows and pictures of each part go to `folder`.
 pub fn run(workspace: &Repository, folder: &Path, arguments: &[String]) -> Result<(Vec<Row>, String, bool)> {
     let known = || PARTS.iter().map(|part| part.name).chain([BRICK, DISTORTED]);
     let (mut names, mut edges) = (Vec::new(), EDGES.to_owned());
@@ -90,7 +92,8 @@ const PARTS: &[BenchTable] = &[
     },
     BenchTable {
         name: "integrators",
-        title: "Time integrators, cube of 17³ nodes that cools from a smooth temperature, and one that is quenched",
+        title: "Time integrators, cube of 17³ nodes that cools from a smooth temperature, and one that is \
+                quenched",
         heading: ["integrator", "steps / tolerance, K", "rms error, K", "s", "steps taken", "CG iterations"],
         more: ["steps", "cg iterations"],
         error: "rms error / K",
@@ -129,8 +132,8 @@ impl BenchTable {
     }
 }
 
-/// Rows `CURVE PLACE: QUANTITY` and `CURVE PLACE: QUANTITY, PROBLEM`, collected in the order of their first appearance;
-/// other rows are of no curve.
+/// Rows `CURVE PLACE: QUANTITY` and `CURVE PLACE: QUANTITY, PROBLEM`, collected in the order of their first
+/// appearance; other rows are of no curve.
 fn curves(rows: &[Row]) -> Vec<BenchCurve> {
     let mut curves: Vec<BenchCurve> = Vec::new();
     for row in rows {

@@ -69,8 +69,9 @@ pub fn compare(found: &[[f64; 3]], reference: &[[f64; 3]]) -> Option<ForceDiffer
     Some(ForceDifference { largest, at, differing: all.iter().filter(|&&x| x >= 1e-6).count() })
 }
 
-/// LAMMPS' contact force density, N/m³: pairs closer than d = min(0.9 |ξ|, 1.35 Δx) push each other apart with
-/// 15 c V (d − r)/δ, c = 18K/(πδ⁴); Parks et al. 2008, doi:10.1016/j.cpc.2008.06.011 (short-range forces). All pairs are looked at.
+/// LAMMPS' contact force density, N/m³: pairs closer than d = min(0.9 |ξ|, 1.35 Δx) push each other apart
+/// with 15 c V (d − r)/δ, c = 18K/(πδ⁴); Parks et al. 2008, doi:10.1016/j.cpc.2008.06.011 (short-range
+/// forces). All pairs are looked at.
 pub fn contact(state: &Snapshot, spacing: f64, horizon: f64, bulk_modulus: f64) -> Vec<[f64; 3]> {
     let places: Vec<[f64; 3]> = state.places().collect();
     let stiffness = 15.0 * 18.0 * bulk_modulus / (std::f64::consts::PI * horizon.powi(4)) * spacing.powi(3);

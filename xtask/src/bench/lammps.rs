@@ -149,7 +149,8 @@ mod tests {
     fn what_lammps_prints() {
         let text = "LAMMPS (22 Jul 2025 - Update 4)\nPeridynamic bonds:\n  total # of bonds = 11006544\n\
                     Loop time of 3.255e-06 on 1 procs for 0 steps with 97336 atoms\n\
-                    Loop time of 2.21767 on 1 procs for 10 steps with 97336 atoms\nTotal wall time: 0:00:05\n";
+                    Loop time of 2.21767 on 1 procs for 10 steps with 97336 atoms\n\
+                    Total wall time: 0:00:05\n";
         let version = "22 Jul 2025 - Update 4".to_owned();
         assert_eq!(parse(text), Some(LammpsRun { version, bonds: 11_006_544, seconds: 2.217_67 }));
         assert_eq!(parse("ERROR: no such style"), None);

@@ -1,8 +1,9 @@
 //! Error against time of every inverse Langevin function.
 //!
-//! Error: the largest relative one on a grid of (0, 1) graded to both ends. That of the exact inverse is taken against
-//! the mpmath values of polycore's tests; the others are compared with the exact inverse, whose error is 2e-16.
-//! Time: the median over repeats of a row of shuffled uniform arguments, divided by its length; one core.
+//! Error: the largest relative one on a grid of (0, 1) graded to both ends. That of the exact inverse is
+//! taken against the mpmath values of polycore's tests; the others are compared with the exact inverse, whose
+//! error is 2e-16. Time: the median over repeats of a row of shuffled uniform arguments, divided by its
+//! length; one core.
 
 use std::hint::black_box;
 use std::path::Path;

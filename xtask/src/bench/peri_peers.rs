@@ -1,5 +1,5 @@
-//! `peri` beside LAMMPS' `peri/pmb`: the same elastic block, the same particles, horizon and steps, alternating runs in
-//! one go; and the forces of both, particle by particle.
+//! `peri` beside LAMMPS' `peri/pmb`: the same elastic block, the same particles, horizon and steps,
+//! alternating runs in one go; and the forces of both, particle by particle.
 
 use std::path::{Path, PathBuf};
 
@@ -26,8 +26,8 @@ const ROUNDS: usize = 5;
 const SMALL: f64 = 0.01;
 const LARGE: f64 = 0.2;
 
-/// The forces are the same problem's up to here, in units of their root mean square: bonds are fitted to 1e-9 of their
-/// force (the solver's bound), which together are about ten times what is left of them.
+/// The forces are the same problem's up to here, in units of their root mean square: bonds are fitted to 1e-9
+/// of their force (the solver's bound), which together are about ten times what is left of them.
 const SAME: f64 = 1e-8;
 
 /// Rows, tables, and whether both programs solved the same problem.
@@ -66,7 +66,8 @@ pub fn run(workspace: &Repository, folder: &Path) -> Result<(Vec<Row>, String, b
     let after = load();
     let shown = |load: Option<f64>| load.map_or_else(|| "?".to_owned(), |load| load.to_string());
     let text = format!(
-        "LAMMPS ({version}) peri/pmb, 1 MPI process a thread; medians of {ROUNDS} alternating runs; bonds are directed\n\
+        "LAMMPS ({version}) peri/pmb, 1 MPI process a thread; medians of {ROUNDS} alternating runs; bonds \
+         are directed\n\
          load average of the machine: {} before, {} after\n\n{}\n{}",
         shown(before),
         shown(after),

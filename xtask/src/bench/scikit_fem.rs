@@ -50,7 +50,8 @@ impl ScikitFem {
         }
         let folder = folder.display();
         Ok(Err(format!(
-            "none in {folder} (python3 -m venv {folder} && {folder}/bin/pip install scikit-fem scipy; {VARIABLE} \
+            "none in {folder} (python3 -m venv {folder} && {folder}/bin/pip install scikit-fem scipy; \
+             {VARIABLE} \
              names another virtual environment)"
         )))
     }

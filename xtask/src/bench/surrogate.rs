@@ -1,5 +1,5 @@
-//! `mdsurrogate`: its own measurements; beside them, in the same run, an epoch of the thesis' network in PyTorch, and the
-//! answers of a trained law in PyTorch and in onnxruntime.
+//! `mdsurrogate`: its own measurements; beside them, in the same run, an epoch of the thesis' network in
+//! PyTorch, and the answers of a trained law in PyTorch and in onnxruntime.
 
 use std::fmt::Write as _;
 use std::path::Path;

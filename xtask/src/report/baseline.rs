@@ -143,7 +143,8 @@ mod tests {
     fn what_moved() {
         let old = |value: f64, pass: bool| -> EarlierReport {
             serde_json::from_str(&format!(
-                r#"{{"commit": "abc", "cases": [{{"case": "ch2/plate", "passed": {pass}, "seconds": 0, "work": {{}},
+                r#"{{"commit": "abc", "cases": [{{"case": "ch2/plate", "passed": {pass}, "seconds": 0,
+                "work": {{}},
                     "expect": [{{"quantity": "kt", "value": {value}, "pass": {pass}}}]}}]}}"#
             ))
             .expect("a baseline")

@@ -134,7 +134,8 @@ mod tests {
 
     #[test]
     fn rows_of_markdown() {
-        let text = "## Chapter 4: x\n\n| a | b | c | d |\n|---|---|---|---|\n| (4.1) | \\|DTEMP\\| | z = \\[1\\] | t |\nno\n| a |";
+        let text = "## Chapter 4: x\n\n| a | b | c | d |\n|---|---|---|---|\n| (4.1) | \\|DTEMP\\| | z = \
+                    \\[1\\] | t |\nno\n| a |";
         let rows = parse(text);
         assert_eq!(rows.len(), 1);
         assert_eq!(rows[0].chapter, "Chapter 4");

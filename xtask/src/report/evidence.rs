@@ -80,7 +80,8 @@ pub enum NumberState {
     NotRun,
 }
 
-/// A verdict on findings, with a tone for the page: what is missed fails, what was met backs, the rest does not.
+/// A verdict on findings, with a tone for the page: what is missed fails, what was met backs, the rest does
+/// not.
 pub fn verdict(findings: &[NumberRow]) -> Option<(&'static str, &'static str)> {
     let has = |state| findings.iter().any(|finding| finding.state == state);
     match () {
@@ -260,7 +261,8 @@ mod tests {
     fn records_of_tests() {
         let root = tempfile::tempdir().expect("a folder");
         std::fs::write(root.path().join("source"), "1").expect("a source");
-        let text = r#"{"name": "n", "value": 0.5, "at_most": 1, "met": true, "test": "t", "file": "f", "stamp": null}"#;
+        let text = r#"{"name": "n", "value": 0.5, "at_most": 1, "met": true, "test": "t",
+            "file": "f", "stamp": null}"#;
         let mut record: crate::test::TestRecord = serde_json::from_str(text).expect("a record");
         record.stamp = Some(SourceStamp::new(root.path(), &["source".to_owned()]).expect("a stamp"));
         let row = TestNumber { record: "n".to_owned(), what: "w".to_owned(), thesis: None };

@@ -1,4 +1,5 @@
-//! docs/validation.md: what stays the same from day to day, without seconds; dates and machines are those of benches.
+//! docs/validation.md: what stays the same from day to day, without seconds; dates and machines are those of
+//! benches.
 
 use harness::report::Kind;
 
@@ -10,7 +11,8 @@ use crate::table::TextTable;
 /// Sums, thesis map, links between scales, cases, fronts, cross-checks.
 pub fn text(page: &Page, outcomes: &[CaseOutcome]) -> String {
     let mut text = format!(
-        "# Validation\n\nWritten by `cargo xtask validate`: {}.\nThe same with pictures, every number and its source is \
+        "# Validation\n\nWritten by `cargo xtask validate`: {}.\nThe same with pictures, every number and \
+         its source is \
          `target/validation/report.html`.\n",
         page.sums
     );
@@ -34,7 +36,8 @@ pub fn text(page: &Page, outcomes: &[CaseOutcome]) -> String {
     page.links.iter().for_each(|judged| table.push(judged.cells()));
     text += &table.markdown();
     if !page.others.is_empty() {
-        text += "\n## Others' figures\n\nFigures of other authors beside ours (cases below `cases/external`).\n\n";
+        text += "\n## Others' figures\n\nFigures of other authors beside ours (cases below \
+                 `cases/external`).\n\n";
         let mut table = TextTable::new(["case", "what", "source", "figure", "ours", "verdict"]);
         page.others.iter().for_each(|other| table.push(other.cells()));
         text += &table.markdown();
@@ -49,7 +52,8 @@ pub fn text(page: &Page, outcomes: &[CaseOutcome]) -> String {
         table.push([outcome.case.clone(), outcome.program.clone(), all, ours, missed]);
     }
     text += &table.markdown();
-    text += "\n## Error against run time\n\nMethods that no other measured method beats in both error and time.\n\n";
+    text += "\n## Error against run time\n\nMethods that no other measured method beats in both error and \
+             time.\n\n";
     let mut table = TextTable::new(["what", "front", "default", "measured"]);
     let mut absent = Vec::new();
     for measured in &page.timing {

@@ -24,13 +24,15 @@ pub struct ExternalFigure {
 }
 
 impl ExternalFigure {
-    /// Cells of the row in docs/validation.md: case, quantity, source, figure with its tolerance, ours, verdict.
+    /// Cells of the row in docs/validation.md: case, quantity, source, figure with its tolerance, ours,
+    /// verdict.
     pub fn cells(&self) -> [String; 6] {
         [&self.case, &self.quantity, &self.source, &self.figure, &self.ours, self.verdict].map(str::to_owned)
     }
 }
 
-/// Comparisons of all cases in the folder with closed forms, publications and other programs. A regression among them keeps our own distance from a foreign figure, which is therefore missed.
+/// Comparisons of all cases in the folder with closed forms, publications and other programs. A regression
+/// among them keeps our own distance from a foreign figure, which is therefore missed.
 pub fn figures(outcomes: &[CaseOutcome]) -> Vec<ExternalFigure> {
     let of_others = |kind| {
         matches!(kind, Kind::ClosedForm | Kind::Published | Kind::IndependentProgram | Kind::Regression)

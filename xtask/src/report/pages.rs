@@ -7,8 +7,8 @@ use harness::view;
 
 use crate::outcome::CaseOutcome;
 
-/// Writes the page of a case that wrote fields of a fracture or a print, where its results are newer, and gives its path.
-/// None where there is nothing to turn.
+/// Writes the page of a case that wrote fields of a fracture or a print, where its results are newer, and
+/// gives its path. None where there is nothing to turn.
 pub fn page(outcome: &CaseOutcome) -> Option<PathBuf> {
     let report = outcome.report.as_ref()?;
     let of_it =

@@ -109,7 +109,8 @@ fn smaller(path: &Path) -> Option<Vec<u8>> {
     Some(bytes)
 }
 
-/// Each pixel of `target` is the mean of the pixels of `source` that it covers, partly covered ones in proportion.
+/// Each pixel of `target` is the mean of the pixels of `source` that it covers, partly covered ones in
+/// proportion.
 fn average(pixels: &[u8], source: (usize, usize), target: (usize, usize), channels: usize) -> Vec<u8> {
     let columns = spans(source.0, target.0);
     let rows = spans(source.1, target.1);

@@ -7,7 +7,8 @@ use harness::report::Value;
 use crate::bench::Row;
 use crate::outcome::CaseOutcome;
 
-/// Rows of errors with the rows of times of the same point, of the largest size that has both: name, time, error.
+/// Rows of errors with the rows of times of the same point, of the largest size that has both: name, time,
+/// error.
 pub fn pairs(rows: &[Row], error: &str, time: &str) -> Vec<(String, f64, f64)> {
     let key = |row: &Row, marker: &str| {
         let at = row.what.find(marker)?;

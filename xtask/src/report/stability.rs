@@ -51,7 +51,7 @@ pub fn trials(outcomes: &[CaseOutcome]) -> Vec<StabilityTrial> {
 
 /// A row of suite.json, which some programs write beside their report.
 #[derive(Deserialize)]
-struct SuiteRow {
+struct StabilityRow {
     case: String,
     description: String,
     observed: String,
@@ -61,8 +61,8 @@ struct SuiteRow {
 
 fn suite_trials(case: &str, output: &Path) -> Vec<StabilityTrial> {
     let text = fs::read_to_string(output.join("suite.json")).unwrap_or_default();
-    let rows: Vec<SuiteRow> = serde_json::from_str(&text).unwrap_or_default();
-    let trial = |row: SuiteRow| StabilityTrial {
+    let rows: Vec<StabilityRow> = serde_json::from_str(&text).unwrap_or_default();
+    let trial = |row: StabilityRow| StabilityTrial {
         case: case.to_owned(),
         what: row.case,
         description: row.description,
@@ -116,7 +116,8 @@ mod tests {
     fn rows_of_a_suite() {
         let folder = tempfile::tempdir().expect("a folder");
         assert!(suite_trials("ch4/x", folder.path()).is_empty());
-        let rows = r#"[{"case": "a", "description": "end", "observed": "ended", "pass": true, "steps": 7, "seconds": 0.1}]"#;
+        let rows = r#"[{"case": "a", "description": "end", "observed": "ended", "pass": true,
+            "steps": 7, "seconds": 0.1}]"#;
         fs::write(folder.path().join("suite.json"), rows).expect("a suite");
         let trials = suite_trials("ch4/x", folder.path());
         assert_eq!(

@@ -1,4 +1,5 @@
-//! The thesis map: every numbered figure and table that holds a result, and what became of it here (cases/thesis.toml).
+//! The thesis map: every numbered figure and table that holds a result, and what became of it here
+//! (cases/thesis.toml).
 
 use std::collections::BTreeSet;
 use std::fs;

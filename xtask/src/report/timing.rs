@@ -22,9 +22,11 @@ const FILE: &str = "cases/timing.toml";
 #[derive(Deserialize)]
 #[serde(rename_all = "lowercase", deny_unknown_fields)]
 enum PointSource {
-    /// Rows of target/bench/NAME.json: what distinguishes those of errors and those of times, the rest being a point.
+    /// Rows of target/bench/NAME.json: what distinguishes those of errors and those of times, the rest being
+    /// a point.
     Bench { name: String, error: String, time: String },
-    /// A table among a case's results: a method a row, its name in the first column; these columns, the times multiplied.
+    /// A table among a case's results: a method a row, its name in the first column; these columns, the times
+    /// multiplied.
     Table { case: String, file: String, error: usize, time: usize, scale: f64 },
     /// Curves of a case's report: columns `seconds` and, last, errors.
     Case { name: String, curves: String },
@@ -99,7 +101,8 @@ impl TimingSubject {
         self
     }
 
-    /// The subject, the methods on its front, where the default is, and by what it was measured; for docs/validation.md.
+    /// The subject, the methods on its front, where the default is, and by what it was measured; for
+    /// docs/validation.md.
     pub fn cells(&self) -> Option<[String; 4]> {
         let mut front: Vec<&str> =
             self.points.iter().filter(|p| p.front).map(|p| p.method.as_str()).collect();

@@ -28,7 +28,8 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// Folder of the results of a case's input: in the same relation to the results of the case as the scenes.
+    /// Folder of the results of a case's input: in the same relation to the results of the case as the
+    /// scenes.
     fn results(&self, case: &CaseFile, input: &Path) -> PathBuf {
         self.folder.join(case.name_of(input))
     }
@@ -157,7 +158,8 @@ fn clear(folder: &Path) -> Result<()> {
     fs::create_dir_all(folder).into_diagnostic()
 }
 
-/// `PROGRAM run CASE --output FOLDER [--quick]` or `PROGRAM resume FOLDER`, its output in FOLDER.log; how it failed.
+/// `PROGRAM run CASE --output FOLDER [--quick]` or `PROGRAM resume FOLDER`, its output in FOLDER.log; how it
+/// failed.
 fn start(
     executable: &Path,
     case: &CaseFile,

@@ -55,8 +55,8 @@ const POINTS: usize = 200;
 const KINDS: [(ModelKind, &str); 2] =
     [(ModelKind::Phenomenological, "phenomenological"), (ModelKind::Micromechanical, "chains")];
 
-/// `<data>_<test>_<kind>.png` for every kind of test with at least three states, and `<data>_parity_<kind>.png` for
-/// biaxial tables.
+/// `<data>_<test>_<kind>.png` for every kind of test with at least three states, and
+/// `<data>_parity_<kind>.png` for biaxial tables.
 pub fn pictures(directory: &Path, name: &str, table: &TestData, fits: &[Fit]) -> Result<(), Error> {
     for (kind, suffix) in KINDS {
         let fits: Vec<&Fit> = fits.iter().filter(|fit| fit.model.kind == kind).collect();

@@ -21,8 +21,8 @@ use super::scene::{DataSet, FitCase};
 use super::table_fits::{TableFits, unit_of};
 use super::{card, draw, material, trials};
 
-/// Fits every law to every table, writes tables and pictures. A law that cannot be fitted is named; the others are kept. Where it is
-/// stopped, what is done is written.
+/// Fits every law to every table, writes tables and pictures. A law that cannot be fitted is named; the
+/// others are kept. Where it is stopped, what is done is written.
 pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
     let (directory, quick) = (run.options.output, run.options.quick);
     run.begin()?;
@@ -160,7 +160,8 @@ fn unstable(fit: &Fit, table: &TestData) -> Option<(Mode, f64)> {
         .find_map(|(mode, end)| stability::unstable_from(&fit.law, mode, end).map(|stretch| (mode, stretch)))
 }
 
-/// `fits.csv`: one line for each number, with its standard error where the data determine it; stresses of a table in one unit.
+/// `fits.csv`: one line for each number, with its standard error where the data determine it; stresses of a
+/// table in one unit.
 fn write_fits(directory: &Path, all: &[TableFits]) -> Result<(), Error> {
     let mut text = String::from("data,law,quantity,value,standard_error,unit\n");
     for set in all {
@@ -237,14 +238,16 @@ fn write_states(directory: &Path, name: &str, table: &TestData, fits: &[Fit]) ->
     output::csv::write(directory.join(format!("{name}_states.csv")), &columns)
 }
 
-/// Summary of a run: layout of the files, rms by law and table, verdicts, parameters, a material block for `peri`, trials, then the expectations.
+/// Summary of a run: layout of the files, rms by law and table, verdicts, parameters, a material block for
+/// `peri`, trials, then the expectations.
 fn summary(case: &FitCase, all: &[TableFits], report: &Report) -> String {
     let mut text = format!("{}\n", case.title);
     for set in all {
         set.read.iter().for_each(|line| text += &format!("{}: {line}\n", set.name));
     }
     if !all.is_empty() {
-        text += "rms of the nominal stress, over the measured stresses (their number in brackets); k: parameters\n";
+        text += "rms of the nominal stress, over the measured stresses (their number in brackets); k: \
+                 parameters\n";
         let _ = write!(text, "{:<22}{:>4}", "law", "k");
         for set in all {
             let head = format!("{} ({}), {}", set.name, set.table.measurements(), set.unit().0);
@@ -300,7 +303,8 @@ const SAFE: f64 = 0.9;
 fn verdicts(set: &TableFits) -> String {
     let [low, high] = stability::range(set.table);
     let mut text = format!(
-        "R² of laws fitted to {}; stability (Drucker) in uniaxial, equibiaxial and pure shear tests at stretches {low:.3} to \
+        "R² of laws fitted to {}; stability (Drucker) in uniaxial, equibiaxial and pure shear tests at \
+         stretches {low:.3} to \
          {high:.3}\n",
         set.name
     );

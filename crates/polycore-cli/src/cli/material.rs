@@ -19,8 +19,8 @@ pub const BULK_RATIO: f64 = 100.0;
 /// Standard errors to either side of a value that hold 95 % of a normal distribution.
 const HALF_WIDTH: f64 = 1.96;
 
-/// `[material.solid]` of `peri` for a fitted law: the law itself, with its intervals of confidence. Of a law that the data do not
-/// determine, in comments, what to take.
+/// `[material.solid]` of `peri` for a fitted law: the law itself, with its intervals of confidence. Of a law
+/// that the data do not determine, in comments, what to take.
 fn block(fit: &Fit) -> String {
     let rms = stress(fit.rms, 5);
     if let Some(why) = unusable(fit) {
@@ -75,8 +75,8 @@ pub fn unusable(fit: &Fit) -> Option<String> {
     })
 }
 
-/// The block of the eight-chain law with the least rms; without such a one, of the best law. Laws of which every parameter is known to
-/// half of its size come first.
+/// The block of the eight-chain law with the least rms; without such a one, of the best law. Laws of which
+/// every parameter is known to half of its size come first.
 pub fn best(data: &str, fits: &[Fit]) -> String {
     let known = |fit: &Fit| {
         let sure = |parameter: &FittedParameter| {

@@ -1,13 +1,17 @@
 //! The scalars that reports of `polycore` can have.
 
 harness::quantities! {
-    /// Quantities of fits, `{fit}` = DATA.LAW or, for a fit judged on other data, DATA.LAW.OTHER; and of trials, `{trial}`.
+    /// Quantities of fits, `{fit}` = DATA.LAW or, for a fit judged on other data, DATA.LAW.OTHER; and of
+    /// trials, `{trial}`.
     pub ALL:
     RMS = "{fit}.rms", "MPa", "root mean square of model − measurement";
     MAE = "{fit}.mae", "MPa", "mean of |model − measurement|";
     R2 = "{fit}.r2", "", "1 − Σr²/Σ(P − P̄)²";
-    LOCKED = "{fit}.locked", "", "with `cross`: states of the other data beyond the locking stretch of the law, at which it has no stress; if there are any, there are no other numbers";
-    STABLE = "{fit}.stable", "", "1 if the law is stable (Drucker) in uniaxial, equibiaxial and pure shear tests over the stretches of its data, else 0";
+    LOCKED = "{fit}.locked", "", "with `cross`: states of the other data beyond the locking stretch of the \
+                                  law, at which it has no stress; if there are any, there are no other \
+                                  numbers";
+    STABLE = "{fit}.stable", "", "1 if the law is stable (Drucker) in uniaxial, equibiaxial and pure shear \
+                                  tests over the stretches of its data, else 0";
     FAILED = "{fit}.failed", "", "1 of a law that could not be fitted; it has no other values";
     SHEAR_MODULUS = "{fit}.shear_modulus", "MPa", "shear modulus at rest";
     PARAMETER = "{fit}.{parameter}", "*", "a parameter of the fitted law, stresses in MPa";

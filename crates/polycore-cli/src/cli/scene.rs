@@ -13,7 +13,7 @@ use polycore::constitutive::hyperelastic::{
 use serde::Deserialize;
 
 use super::quantities as q;
-use super::trials::TrialSpec;
+use super::trials::FitTrial;
 
 /// The file as written.
 #[derive(Deserialize, schemars::JsonSchema)]
@@ -27,10 +27,10 @@ struct Scene {
     title: String,
     /// Fits.
     #[serde(default)]
-    fit: FitSpec,
+    fit: FitSettings,
     /// Laws at single states and fits to a few, with their expected behaviour.
     #[serde(default)]
-    trial: Vec<TrialSpec>,
+    trial: Vec<FitTrial>,
     /// Expected results.
     #[serde(default)]
     expect: Vec<Expect>,
@@ -46,7 +46,7 @@ enum Program {
 /// Laws and data to fit.
 #[derive(Default, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-struct FitSpec {
+struct FitSettings {
     /// Names of laws; all of them if not given.
     laws: Option<Vec<String>>,
     /// Judge a law fitted to one table on the other tables, too.
@@ -54,13 +54,13 @@ struct FitSpec {
     cross: bool,
     /// Tables of measurements.
     #[serde(default)]
-    data: Vec<DataSpec>,
+    data: Vec<TestTableSpec>,
 }
 
 /// A table of homogeneous states.
 #[derive(Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-struct DataSpec {
+struct TestTableSpec {
     /// Name in the report.
     name: String,
     /// The CSV file, relative to the scene.
@@ -99,7 +99,7 @@ pub struct FitCase {
     pub laws: Vec<&'static ModelDescriptor>,
     pub cross: bool,
     pub data: Vec<DataSet>,
-    pub trials: Vec<TrialSpec>,
+    pub trials: Vec<FitTrial>,
     pub expect: Vec<Expect>,
 }
 
@@ -183,7 +183,8 @@ impl FitCase {
         }
         let _ = writeln!(
             text,
-            "{} fits, {} trials, {} expectations; writes fits.csv, <data>_states.csv, materials.toml, pictures (not with \
+            "{} fits, {} trials, {} expectations; writes fits.csv, <data>_states.csv, materials.toml, \
+             pictures (not with \
              --quick), report.json",
             self.laws.len() * self.data.len(),
             self.trials.len(),
@@ -264,7 +265,8 @@ fn advice(name: &str) -> Option<&'static str> {
             "an elastic law: rates and relaxation are not modelled; fit the curve of the slowest test"
         }
         "poissonratio" | "nu" => {
-            "nothing: the rubber of a fit is incompressible; compressibility is `bulk_modulus` in a scene of peri"
+            "nothing: the rubber of a fit is incompressible; compressibility is `bulk_modulus` in a scene \
+             of peri"
         }
         "hyperfoam" | "ogdenfoam" | "blatzko" => "an incompressible law: foams are not among them",
         _ => return None,

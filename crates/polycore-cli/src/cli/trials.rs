@@ -18,7 +18,7 @@ use super::{MPA, quantities as q};
 /// Trial: with `parameters` a law is evaluated at a `stretch`, with `data` it is fitted.
 #[derive(Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct TrialSpec {
+pub struct FitTrial {
     /// Name in the report.
     name: String,
     /// Expected behaviour, in words.
@@ -69,7 +69,7 @@ enum TrialResult {
     Fit(Box<hyperelastic::fit::Fit>),
 }
 
-impl TrialSpec {
+impl FitTrial {
     /// Names of the scalars that it may have.
     pub fn quantities(&self) -> Vec<String> {
         let parameters = model(&self.law).map_or(&[][..], |model| model.parameters);
@@ -109,7 +109,7 @@ impl TrialSpec {
 ///
 /// # Errors
 /// What is wrong and where.
-pub fn check(source: &Source, trials: &[TrialSpec]) -> Result<(), SceneError> {
+pub fn check(source: &Source, trials: &[FitTrial]) -> Result<(), SceneError> {
     for (i, trial) in trials.iter().enumerate() {
         let key = |field: &str| format!("trial[{i}].{field}");
         let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
@@ -168,7 +168,7 @@ pub fn check(source: &Source, trials: &[TrialSpec]) -> Result<(), SceneError> {
 ///
 /// # Errors
 /// Unexpected failures.
-pub fn run(trial: &TrialSpec, report: &mut Report) -> Result<(), Error> {
+pub fn run(trial: &FitTrial, report: &mut Report) -> Result<(), Error> {
     let of = |quantity: Quantity| quantity.of(&[&trial.name]);
     let seen = trial.attempt();
     let mut passed = true;
@@ -210,7 +210,7 @@ pub fn run(trial: &TrialSpec, report: &mut Report) -> Result<(), Error> {
 }
 
 /// A trial fails with any expectation on it.
-pub fn judge(trials: &[TrialSpec], report: &mut Report) {
+pub fn judge(trials: &[FitTrial], report: &mut Report) {
     for (trial, seen) in trials.iter().zip(&mut report.trials) {
         let own = trial.quantities();
         let fails = |judged: &&Judgement| {

@@ -65,12 +65,12 @@ pub fn rows(array: ArrayView2<'_, f64>, name: &'static str) -> Result<Vec<Voigt>
 }
 
 impl TestData {
-    /// Stretches, (N), and nominal stresses, (N) in Pa, of a test that one stretch describes; a stress of exactly 0 is a
-    /// condition, not a measurement.
+    /// Stretches, (N), and nominal stresses, (N) in Pa, of a test that one stretch describes; a stress of
+    /// exactly 0 is a condition, not a measurement.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for arrays of two lengths; [`Error::Deformation`] for a stretch that is not positive;
-    /// [`Error::Data`] where no stress was measured.
+    /// [`Error::Invalid`] for arrays of two lengths; [`Error::Deformation`] for a stretch that is not
+    /// positive; [`Error::Data`] where no stress was measured.
     pub fn from_arrays(
         mode: Mode,
         stretch: ArrayView1<'_, f64>,

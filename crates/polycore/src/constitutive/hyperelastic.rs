@@ -1,10 +1,11 @@
-//! Hyperelastic laws of Chapter 1: energy, stresses, consistent tangent, homogeneous responses, and fits to data.
+//! Hyperelastic laws of Chapter 1: energy, stresses, consistent tangent, homogeneous responses, and fits to
+//! data.
 //!
-//! A law is isotropic: its energy per unit reference volume is a symmetric function W(λ₁, λ₂, λ₃) of the principal
-//! stretches, zero at rest. It implements [`Hyperelastic`] in principal values; everything in three dimensions is
-//! provided from there. The incompressible laws leave the pressure open: what they return as stress is the part that W
-//! determines, S = 2 ∂W/∂C. [`Compressible`] adds the volumetric terms of (1.19), (1.21), (1.23), and
-//! [`homogeneous`] eliminates the pressure in tension tests.
+//! A law is isotropic: its energy per unit reference volume is a symmetric function W(λ₁, λ₂, λ₃) of the
+//! principal stretches, zero at rest. It implements [`Hyperelastic`] in principal values; everything in three
+//! dimensions is provided from there. The incompressible laws leave the pressure open: what they return as
+//! stress is the part that W determines, S = 2 ∂W/∂C. [`Compressible`] adds the volumetric terms of (1.19),
+//! (1.21), (1.23), and [`homogeneous`] eliminates the pressure in tension tests.
 //!
 //! ```
 //! use polycore::constitutive::hyperelastic::{EightChain, Hyperelastic, homogeneous};
@@ -72,7 +73,8 @@ pub trait Hyperelastic: Send + Sync {
     /// W(λ₁, λ₂, λ₃) with W(1, 1, 1) = 0.
     ///
     /// # Errors
-    /// [`Error::Locked`] at or beyond a locking stretch, [`Error::Overflow`] where W leaves the range of `f64`.
+    /// [`Error::Locked`] at or beyond a locking stretch, [`Error::Overflow`] where W leaves the range of
+    /// `f64`.
     fn energy_at(&self, stretches: [f64; 3]) -> Result<f64, Error>;
 
     /// Stress and tangent in the principal frame.

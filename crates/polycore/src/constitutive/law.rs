@@ -8,9 +8,9 @@ use std::any::Any;
 
 /// A law of an elastic solid, C → (W, S, ℂ), objective since it is a function of C = FᵀF alone.
 ///
-/// Voigt vectors and tangents follow [`crate::tensor::voigt`]; Pa and J/m³. A law may have no energy (a stress learnt
-/// as a function of C has none), and S(1) need not vanish: incompressible laws leave the pressure open, and return as S the
-/// part that W determines.
+/// Voigt vectors and tangents follow [`crate::tensor::voigt`]; Pa and J/m³. A law may have no energy (a
+/// stress learnt as a function of C has none), and S(1) need not vanish: incompressible laws leave the
+/// pressure open, and return as S the part that W determines.
 pub trait Law: Send + Sync {
     /// Name of the law, for tables and messages.
     fn name(&self) -> String;
@@ -57,8 +57,9 @@ pub trait Law: Send + Sync {
         Ok((voigt::cauchy_from_material(deformation, &prediction.stress), prediction))
     }
 
-    /// Bulk and shear modulus of the tangent at C = 1, of a law without stress there: Voigt's averages over all
-    /// directions (Proc. of Hill 1952, doi:10.1088/0370-1298/65/5/307, Eq. 4–5), exact for an isotropic law.
+    /// Bulk and shear modulus of the tangent at C = 1, of a law without stress there: Voigt's averages over
+    /// all directions (Proc. of Hill 1952, doi:10.1088/0370-1298/65/5/307, Eq. 4–5), exact for an isotropic
+    /// law.
     ///
     /// # Errors
     /// As [`Law::stress`].
@@ -88,15 +89,17 @@ pub struct Moduli {
 pub struct Prediction<T: Scalar = f64> {
     /// S (3.3), Pa.
     pub stress: SVector<T, 6>,
-    /// ℂ = 2 ∂S/∂C, Pa, in the Voigt order without factors (dS = ℂ dE with doubled shear strains); if requested.
+    /// ℂ = 2 ∂S/∂C, Pa, in the Voigt order without factors (dS = ℂ dE with doubled shear strains); if
+    /// requested.
     pub tangent: Option<SMatrix<T, 6, 6>>,
     /// W, J/m³; none of a law that has no energy.
     pub energy: Option<T>,
-    /// Root mean square over the members of an ensemble of the norm of their distance from the mean, Pa; 0 for one. It is
-    /// the norm of `deviation`: √Σₐ sₐ².
+    /// Root mean square over the members of an ensemble of the norm of their distance from the mean, Pa; 0
+    /// for one. It is the norm of `deviation`: √Σₐ sₐ².
     pub spread: T,
-    /// Standard deviation over the M members of each component of S, sₐ = √(Σₘ (Sₐᵐ − Sₐ)²/M), Pa, in the order of
-    /// `stress`; 0 for one member. It belongs to these axes: in others it needs the members' covariance.
+    /// Standard deviation over the M members of each component of S, sₐ = √(Σₘ (Sₐᵐ − Sₐ)²/M), Pa, in the
+    /// order of `stress`; 0 for one member. It belongs to these axes: in others it needs the members'
+    /// covariance.
     pub deviation: SVector<T, 6>,
     /// Reasons for uncertainty; none of a law in closed form.
     pub flags: Flags,
@@ -122,7 +125,8 @@ impl Flags {
     }
 }
 
-/// Scratch memory of a law, kept between its evaluations so that they need not allocate. Keep one for each law and thread: content of another law is dropped.
+/// Scratch memory of a law, kept between its evaluations so that they need not allocate. Keep one for each
+/// law and thread: content of another law is dropped.
 #[derive(Debug, Default)]
 pub struct Workspace(Option<Box<dyn Any + Send>>);
 

@@ -1,4 +1,5 @@
-//! Fully connected networks without a framework: value, Jacobian, gradient and second derivatives, in f64 or f32.
+//! Fully connected networks without a framework: value, Jacobian, gradient and second derivatives, in f64 or
+//! f32.
 
 use crate::constitutive::Error;
 use crate::random::SplitMix64;
@@ -138,8 +139,8 @@ impl<T: Real> Network<T> {
         Self { architecture, layers, packed, transposed }
     }
 
-    /// Glorot's uniform weights, ±√(6/(inputs + outputs)), and no bias, as Keras begins; the same seed gives the same
-    /// network.
+    /// Glorot's uniform weights, ±√(6/(inputs + outputs)), and no bias, as Keras begins; the same seed gives
+    /// the same network.
     ///
     /// # Errors
     /// [`Architecture::check`].
@@ -186,7 +187,8 @@ impl<T: Real> Network<T> {
         tape.output(0)
     }
 
-    /// Outputs and their derivatives, ∂y/∂x_b in list b (forward mode; inputs up to [`LANES`], further ones are left out).
+    /// Outputs and their derivatives, ∂y/∂x_b in list b (forward mode; inputs up to [`LANES`], further ones
+    /// are left out).
     pub fn jacobian<'t>(&self, input: &[T], tape: &'t mut Tape<T>) -> (&'t [T], [&'t [T]; LANES]) {
         let inputs = self.architecture.widths[0];
         tape.fit(self);
@@ -204,7 +206,8 @@ impl<T: Real> Network<T> {
         (tape.output(0), slopes)
     }
 
-    /// Value, gradient and second derivatives of the first output by the inputs (up to [`LANES`], all 0 for more).
+    /// Value, gradient and second derivatives of the first output by the inputs (up to [`LANES`], all 0 for
+    /// more).
     ///
     /// With the sums a of each layer and the adjoints g = ∂out/∂y of its activations y = σ(a):
     /// gradient by reverse mode, H = Σ g σ″(a) (∂a/∂x)(∂a/∂x)ᵀ over all neurons.
@@ -231,7 +234,8 @@ impl<T: Real> Network<T> {
         first_output(tape, 0)
     }
 
-    /// Outputs at up to [`BATCH`] points side by side, to the same bits as one by one; `outputs` is called with each.
+    /// Outputs at up to [`BATCH`] points side by side, to the same bits as one by one; `outputs` is called
+    /// with each.
     pub(crate) fn forward_batch(
         &self,
         inputs: &[[T; LANES]],
@@ -244,7 +248,8 @@ impl<T: Real> Network<T> {
         }
     }
 
-    /// Value and gradient of the first output at up to [`BATCH`] points side by side, to the same bits as one by one.
+    /// Value and gradient of the first output at up to [`BATCH`] points side by side, to the same bits as one
+    /// by one.
     pub(crate) fn gradient_batch(
         &self,
         inputs: &[[T; LANES]],
@@ -317,7 +322,8 @@ mod tests {
         assert_eq!(gradient[2..], [0.0; 6]);
     }
 
-    /// Widths around panels and vectors, all activations, against plain sums in f64: 1e-14 is some roundings a layer.
+    /// Widths around panels and vectors, all activations, against plain sums in f64: 1e-14 is some roundings
+    /// a layer.
     #[test]
     fn kernels_give_what_plain_loops_give() {
         for (width, inputs) in [(1, 3), (7, 6), (16, 1), (17, 5), (40, 7), (97, 8), (224, 4)] {

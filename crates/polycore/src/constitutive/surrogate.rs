@@ -44,7 +44,8 @@ use crate::tensor::{Voigt, Voigt6x6};
 use nalgebra::SVector;
 use support::Nearest;
 
-/// A difference from a component that never changed in the training data that counts as rounding: ten times that of f32.
+/// A difference from a component that never changed in the training data that counts as rounding: ten times
+/// that of f32.
 pub const UNSEEN: f64 = 1e-6;
 
 /// A law C → S in one of two precisions.
@@ -99,7 +100,8 @@ pub struct Coefficients<'a, T> {
     pub turn: Option<&'a [[T; 6]; 6]>,
     /// Terms of each member of an energy.
     pub rest: &'a [RestTerm<T>],
-    /// Distance in standard deviations beyond which a C is far from all representatives of the training strains.
+    /// Distance in standard deviations beyond which a C is far from all representatives of the training
+    /// strains.
     pub farthest: Option<f64>,
 }
 
@@ -107,8 +109,9 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
     /// A law from its header and the networks of its members.
     ///
     /// # Errors
-    /// [`Header::check`]; [`Error::Invalid`] for another number of networks or another architecture, axes that are
-    /// not orthonormal, or a negative weight where a polyconvex energy must have none ([`Kind::non_negative`]).
+    /// [`Header::check`]; [`Error::Invalid`] for another number of networks or another architecture, axes
+    /// that are not orthonormal, or a negative weight where a polyconvex energy must have none
+    /// ([`Kind::non_negative`]).
     pub fn new(header: Header, members: Vec<Network<T>>) -> Result<Self, Error> {
         header.check()?;
         if members.len() != header.members {
@@ -166,8 +169,9 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         Ok(law)
     }
 
-    /// A law with random weights ([`Network::random`], seeds `seed`, `seed` + 1, …). Where [`Kind::non_negative`] asks for
-    /// it they are |w|/√n with n inputs: a sum of n numbers of one sign is √n times as large as one of both signs.
+    /// A law with random weights ([`Network::random`], seeds `seed`, `seed` + 1, …). Where
+    /// [`Kind::non_negative`] asks for it they are |w|/√n with n inputs: a sum of n numbers of one sign is √n
+    /// times as large as one of both signs.
     ///
     /// # Errors
     /// Those of [`Surrogate::new`].
@@ -191,9 +195,9 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         Self::new(header, members)
     }
 
-    /// The correction of member m. Of a polyconvex energy it is polyconvex itself: with S(I) = Σ sᵢ aᵢ⊗aᵢ in the material
-    /// axes, add ½|sᵢ| (aᵢ·Caᵢ − 1) for sᵢ < 0 and ½sᵢ (aᵢ·cof C aᵢ − 1) − sᵢ(J − 1) for sᵢ > 0, since
-    /// 2 ∂(aᵢ·cof C aᵢ)/∂C = 2(1 − aᵢ⊗aᵢ) and 2 ∂J/∂C = 1 at I (after Linden et al. 2023,
+    /// The correction of member m. Of a polyconvex energy it is polyconvex itself: with S(I) = Σ sᵢ aᵢ⊗aᵢ in
+    /// the material axes, add ½|sᵢ| (aᵢ·Caᵢ − 1) for sᵢ < 0 and ½sᵢ (aᵢ·cof C aᵢ − 1) − sᵢ(J − 1) for sᵢ > 0,
+    /// since 2 ∂(aᵢ·cof C aᵢ)/∂C = 2(1 − aᵢ⊗aᵢ) and 2 ∂J/∂C = 1 at I (after Linden et al. 2023,
     /// <https://doi.org/10.1016/j.jmps.2023.105363>).
     fn rest_of(&self, m: usize, invariants: SymmetryInvariants) -> RestTerm<T> {
         let mut tape = Tape::default();
@@ -310,17 +314,17 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
     /// S and the tangent 2 ∂S/∂C at C with their uncertainty.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for a C that is not finite or not positive definite, and for a result that is not finite (a C
-    /// so far away that the networks overflow).
+    /// [`Error::Invalid`] for a C that is not finite or not positive definite, and for a result that is not
+    /// finite (a C so far away that the networks overflow).
     pub fn tangent(&self, c: &SVector<T, 6>, memory: &mut Workspace) -> Result<Prediction<T>, Error> {
         memory.with(|memory| self.evaluate(c, true, memory))
     }
 }
 
 impl Surrogate<f64> {
-    /// The same model, which flags predictions where its members disagree by more than at any of these strains, those of
-    /// its training: as box and distance, a spread is uncertain beyond all that the training rows have. No limit for a
-    /// single member, or for members that agree everywhere.
+    /// The same model, which flags predictions where its members disagree by more than at any of these
+    /// strains, those of its training: as box and distance, a spread is uncertain beyond all that the
+    /// training rows have. No limit for a single member, or for members that agree everywhere.
     ///
     /// # Errors
     /// Those of [`Surrogate::stress`].

@@ -9,8 +9,8 @@ use nalgebra::{SVector, Vector3};
 /// Step of the central differences: truncation h² ~ 1e-10 and rounding ε/h ~ 2e-11 of the law's own size.
 const STEP: f64 = 1e-5;
 
-/// Deviations of a law from what it must keep, each the largest over some deformations. A deviation of stress or tangent is
-/// relative to the law's size there: the largest component of S and ℂ, and |W|.
+/// Deviations of a law from what it must keep, each the largest over some deformations. A deviation of stress
+/// or tangent is relative to the law's size there: the largest component of S and ℂ, and |W|.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Deviations {
     /// Deviation of S from 2 ∂W/∂C by central differences; `None` for a law without an energy.
@@ -21,7 +21,8 @@ pub struct Deviations {
     pub asymmetry: f64,
     /// ‖σ(QF) − Qσ(F)Qᵀ‖ for a rotation Q.
     pub objectivity: f64,
-    /// Deviation of a stress alone from the stress with its tangent, and of a list from single points: 0, the same bits.
+    /// Deviation of a stress alone from the stress with its tangent, and of a list from single points: 0, the
+    /// same bits.
     pub bits: f64,
     /// |W(1)| over the size there; none of a law without an energy.
     pub energy_at_rest: Option<f64>,
@@ -98,7 +99,9 @@ impl Deviations {
     }
 }
 
-/// Counts, among `count` random deformations and directions, the states without a real wave speed: the law has lost its ellipticity there, (m ⊗ N) : ∂P/∂F : (m ⊗ N) < 0 beyond rounding. Strains go up to several hundred per cent.
+/// Counts, among `count` random deformations and directions, the states without a real wave speed: the law
+/// has lost its ellipticity there, (m ⊗ N) : ∂P/∂F : (m ⊗ N) < 0 beyond rounding. Strains go up to several
+/// hundred per cent.
 ///
 /// # Errors
 /// Errors of the law.
@@ -129,8 +132,8 @@ pub fn count_ellipticity_losses(
     Ok(lost)
 }
 
-/// Deformations for tests, far from the locking of rubber: at rest, small, sheared, with two and three equal stretches, and
-/// general ones.
+/// Deformations for tests, far from the locking of rubber: at rest, small, sheared, with two and three equal
+/// stretches, and general ones.
 pub fn deformations() -> Vec<DeformationGradient> {
     let q: Tensor = nalgebra::Rotation3::from_euler_angles(0.3, -1.1, 2.0).into_inner();
     let half = 0.5_f64.sqrt();

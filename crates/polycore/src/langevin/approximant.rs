@@ -4,8 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use super::inverse;
 
-/// Ways to compute 𝓛⁻¹. All are odd; in formulas x is |x| and c = 1 − |x|, kept apart so that no digits are lost
-/// near locking. Howard 2020 (doi:10.1007/s00397-020-01195-8) is left out: its formula could not be checked here.
+/// Ways to compute 𝓛⁻¹. All are odd; in formulas x is |x| and c = 1 − |x|, kept apart so that no digits are
+/// lost near locking. Howard 2020 (doi:10.1007/s00397-020-01195-8) is left out: its formula could not be
+/// checked here.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -314,7 +315,8 @@ mod tests {
             let found = 100.0 * largest_error(choice);
             assert!((found - percent).abs() <= unit, "{}: {found} %, published {printed} %", choice.name());
         }
-        // no figure in the literature known to us: ours, as a record. Treloar's form has no pole: 100 % at x = 1
+        // no figure in the literature known to us: ours, as a record. Treloar's form has no pole: 100 % at x
+        // = 1
         assert!((largest_error(Inverse::Puso) - 0.046_125).abs() < 1e-5);
         assert!((largest_error(Inverse::Treloar) - 1.0).abs() < 1e-9);
         assert_eq!(largest_error(Inverse::Exact), 0.0);

@@ -1,7 +1,7 @@
 //! Bisection.
 
-/// Halves [low, high] by whether `is_below` holds in the middle, `steps` times or until no number lies between; the condition holds
-/// below some place and not above. `low` may be greater than `high`.
+/// Halves [low, high] by whether `is_below` holds in the middle, `steps` times or until no number lies
+/// between; the condition holds below some place and not above. `low` may be greater than `high`.
 pub fn bisect(mut low: f64, mut high: f64, steps: usize, mut is_below: impl FnMut(f64) -> bool) -> [f64; 2] {
     for _ in 0..steps {
         let middle = 0.5 * (low + high);

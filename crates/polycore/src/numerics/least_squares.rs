@@ -12,26 +12,27 @@ pub struct Optimum {
     pub objective: f64,
 }
 
-/// Minimises ½Σr² from `start` by the Levenberg–Marquardt method of MINPACK (Moré 1978, doi:10.1007/BFb0067700), with at most
-/// `patience`·(n + 1) evaluations of residuals in n parameters. A `None` of residuals or of their Jacobian ends the search.
+/// Minimises ½Σr² from `start` by the Levenberg–Marquardt method of MINPACK (Moré 1978,
+/// doi:10.1007/BFb0067700), with at most `patience`·(n + 1) evaluations of residuals in n parameters. A
+/// `None` of residuals or of their Jacobian ends the search.
 pub fn levenberg_marquardt(
     start: DVector<f64>,
     patience: usize,
     residuals: impl Fn(&DVector<f64>) -> Option<DVector<f64>>,
     jacobian: impl Fn(&DVector<f64>) -> Option<DMatrix<f64>>,
 ) -> Optimum {
-    let problem = Residuals { at: start, residuals, jacobian };
+    let problem = ResidualFunction { at: start, residuals, jacobian };
     let (problem, report) = LevenbergMarquardt::new().with_patience(patience).minimize(problem);
     Optimum { at: problem.at, objective: report.objective_function }
 }
 
-struct Residuals<R, J> {
+struct ResidualFunction<R, J> {
     at: DVector<f64>,
     residuals: R,
     jacobian: J,
 }
 
-impl<R, J> LeastSquaresProblem<f64, Dyn, Dyn> for Residuals<R, J>
+impl<R, J> LeastSquaresProblem<f64, Dyn, Dyn> for ResidualFunction<R, J>
 where
     R: Fn(&DVector<f64>) -> Option<DVector<f64>>,
     J: Fn(&DVector<f64>) -> Option<DMatrix<f64>>,

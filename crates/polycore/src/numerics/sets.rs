@@ -1,6 +1,7 @@
 //! Disjoint sets (Tarjan 1975, doi:10.1145/321879.321884).
 
-/// Sets of the numbers 0 … n − 1, each at first alone. The least number of a set stands for it, whatever the order of unions.
+/// Sets of the numbers 0 … n − 1, each at first alone. The least number of a set stands for it, whatever the
+/// order of unions.
 #[derive(Clone, Debug)]
 pub struct DisjointSets(Vec<u32>);
 

@@ -102,7 +102,8 @@ impl Separator {
         [joined, apart].into_iter().find(|found| found.len() == width).unwrap_or(cells)
     }
 
-    /// Cells that are numbers, less those of several numbers in which another separator stands, twice, or a blank.
+    /// Cells that are numbers, less those of several numbers in which another separator stands, twice, or a
+    /// blank.
     fn score(self, lines: &[(usize, &str)]) -> i64 {
         let digit = |text: &str, end: bool| {
             let letter = if end { text.chars().next_back() } else { text.chars().next() };
@@ -135,8 +136,8 @@ impl Separator {
 }
 
 impl Decimal {
-    /// The number that a cell is: digits with one decimal sign, separators of thousands only where that is certain (both
-    /// signs occur, in groups of three), an exponent.
+    /// The number that a cell is: digits with one decimal sign, separators of thousands only where that is
+    /// certain (both signs occur, in groups of three), an exponent.
     pub fn number(self, text: &str) -> Option<f64> {
         let start = text.trim_start_matches(['+', '-', '−']);
         if !start.starts_with(|c: char| c.is_ascii_digit() || c == '.' || c == ',') {
@@ -272,14 +273,16 @@ impl Heads {
     }
 }
 
-/// Returns true for a row of units: every cell that is not blank is one, and at least one is more than a dash.
+/// Returns true for a row of units: every cell that is not blank is one, and at least one is more than a
+/// dash.
 fn is_units(row: &csv::StringRecord) -> bool {
     let real = row.iter().any(|cell| is_unit(&plain_unit(cell)));
     let unit = |cell: &str| plain_unit(cell).is_empty() || is_unit(&plain_unit(cell));
     real && row.iter().all(unit)
 }
 
-/// Units below headings; between blanks, where some have none, each belongs to the heading that ends next to it.
+/// Units below headings; between blanks, where some have none, each belongs to the heading that ends next to
+/// it.
 fn aligned(separator: Separator, names: &str, units: &str, width: usize) -> Vec<String> {
     let cells: Vec<String> = separator.record(units).iter().map(str::to_owned).collect();
     if separator != Separator::Blanks || cells.len() == width {
@@ -301,7 +304,8 @@ fn aligned(separator: Separator, names: &str, units: &str, width: usize) -> Vec<
     found
 }
 
-/// Headings in the last remark above a row that has as many cells (`##Temp./°C;Time/min`, `# strain stress`), and its line.
+/// Headings in the last remark above a row that has as many cells (`##Temp./°C;Time/min`, `# strain stress`),
+/// and its line.
 fn headed_by_remark(
     separator: Separator,
     lines: &[&str],

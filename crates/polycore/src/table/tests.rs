@@ -15,7 +15,8 @@ fn refused(text: &str) -> String {
     values.and(other).expect_err(text).to_string()
 }
 
-/// Strain (as a fraction) and stress (Pa) of files in the ways of testing machines and of people: the numbers are the same.
+/// Strain (as a fraction) and stress (Pa) of files in the ways of testing machines and of people: the numbers
+/// are the same.
 #[test]
 fn ways_to_write_a_table() {
     for (text, how) in [
@@ -30,12 +31,16 @@ fn ways_to_write_a_table() {
         ("Stress,Note,Strain\nMPa,,%\n0.5,a,12.5\n1.5,,25\n", "headings in line 1, units in line 2"),
         // testXpert: metadata, quotes, a row of units
         (
-            "\"Prüfer\";\"M. Weiß\"\n\"Dicke\";\"2,01\";\"mm\"\n\n\"Strain\";\"Stress\"\n\"%\";\"N/mm²\"\n\"12,5\";\"0,5\"\n\"25\";\"1,5\"\n",
+            "\"Prüfer\";\"M. \
+             Weiß\"\n\"Dicke\";\"2,01\";\"mm\"\n\n\"Strain\";\"Stress\"\n\
+             \"%\";\"N/mm²\"\n\"12,5\";\"0,5\"\n\"25\";\"1,5\"\n",
             "decimal comma, UTF-8, headings in line 4, units in line 5",
         ),
         // Bluehill: quoted numbers with thousands, units in brackets below
         (
-            "Specimen label,A 12\nTemperature,23\n\nStrain,Stress\n(mm/mm),(Pa)\n\"0.125\",\"500,000.0\"\n\"0.25\",\"1,500,000.0\"\n",
+            "Specimen label,A \
+             12\nTemperature,23\n\nStrain,Stress\n\
+             (mm/mm),(Pa)\n\"0.125\",\"500,000.0\"\n\"0.25\",\"1,500,000.0\"\n",
             "separator `,`, decimal point, UTF-8, headings in line 4, units in line 5",
         ),
         ("strain    stress (MPa)\n0.125   0.5\n0.25    1.5\n", "separated by blanks, decimal point"),
@@ -90,8 +95,10 @@ fn encodings() {
 /// Mettler STARe: between blanks, units right-aligned below some of the headings.
 #[test]
 fn units_below_headings_between_blanks() {
-    let text = "Curve Name:\n  !&PA12 cooling\nCurve Values:\n     Index             t            Ts         Value\n\
-                \x20                   [s]          [°C]          [mW]\n         0             0       200.012        -0.123\n\
+    let text = "Curve Name:\n  !&PA12 cooling\nCurve Values:\n\
+                \x20    Index             t            Ts         Value\n\
+                \x20                   [s]          [°C]          [mW]\n\
+                \x20        0             0       200.012        -0.123\n\
                 \x20        1            60       199.012        -0.125\n";
     let table = parse(text);
     let units: Vec<_> = table.headings.iter().map(|heading| heading.unit.as_deref()).collect();

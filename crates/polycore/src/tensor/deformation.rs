@@ -59,7 +59,8 @@ impl DeformationGradient {
         Self::new(Tensor::from_diagonal(&stretches.into()))
     }
 
-    /// The upper triangular F with FᵀF = C (3.2), Cholesky's: one of the F of this C, which differ by a rotation.
+    /// The upper triangular F with FᵀF = C (3.2), Cholesky's: one of the F of this C, which differ by a
+    /// rotation.
     ///
     /// # Errors
     /// [`Error::NotPositiveDefinite`].
@@ -85,8 +86,8 @@ impl DeformationGradient {
         Self::new(embed(in_plane, 1.0))
     }
 
-    /// Plane stress with a thickness stretch λ₃ that is known; [`crate::constitutive::hyperelastic::plane_stress`]
-    /// finds the one that makes S₃₃ vanish.
+    /// Plane stress with a thickness stretch λ₃ that is known;
+    /// [`crate::constitutive::hyperelastic::plane_stress`] finds the one that makes S₃₃ vanish.
     ///
     /// # Errors
     /// As [`DeformationGradient::new`]; [`Error::Stretch`] for λ₃.
@@ -223,7 +224,8 @@ mod tests {
         }
     }
 
-    /// Simple shear γ: λ = √(1 + γ²/4) ± γ/2 and 1, J = 1, I₁ = I₂ = 3 + γ². At γ = 1e8 the stretches are 1e±8.
+    /// Simple shear γ: λ = √(1 + γ²/4) ± γ/2 and 1, J = 1, I₁ = I₂ = 3 + γ². At γ = 1e8 the stretches are
+    /// 1e±8.
     #[test]
     fn simple_shear_in_closed_form() {
         for gamma in [0.0, 1e-9, 1e-3, 0.5, 3.0, 1e4, 1e8] {
@@ -287,7 +289,8 @@ mod tests {
         }
     }
 
-    /// Subtracting the first row leaves diag(ε, ε): det = ε² exactly, of which the plain expansion keeps nothing.
+    /// Subtracting the first row leaves diag(ε, ε): det = ε² exactly, of which the plain expansion keeps
+    /// nothing.
     #[test]
     fn near_singular_determinants_have_the_right_sign() {
         let tiny = f64::EPSILON;

@@ -28,7 +28,8 @@ pub fn von_mises([x, y, z, first, second, third]: [f64; 6]) -> f64 {
 }
 
 impl DeformationGradient {
-    /// Rewrites a stress from one measure in another. Same unit in and out; a measure into itself is returned as it is.
+    /// Rewrites a stress from one measure in another. Same unit in and out; a measure into itself is returned
+    /// as it is.
     pub fn convert_stress(&self, stress: &Tensor, from: StressMeasure, to: StressMeasure) -> Tensor {
         use StressMeasure::{Cauchy, FirstPiolaKirchhoff, Kirchhoff, SecondPiolaKirchhoff};
         let f = self.matrix();

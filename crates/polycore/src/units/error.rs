@@ -27,7 +27,8 @@ pub enum UnitError {
         example: &'static str,
     },
     /// A symbol that is not in the table.
-    #[error("unknown unit `{unit}` in `{text}`{}", suggestion.as_ref().map(|s| format!("; did you mean `{s}`?")).unwrap_or_default())]
+    #[error("unknown unit `{unit}` in `{text}`{}", suggestion.as_ref().map(|s| format!("; did you mean \
+        `{s}`?")).unwrap_or_default())]
     Unknown {
         /// The symbol.
         unit: String,

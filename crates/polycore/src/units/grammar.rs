@@ -192,7 +192,8 @@ impl UnitParser<'_> {
         match ascii.parse::<i32>() {
             Ok(power) if power != 0 && power.abs() <= LARGEST_POWER => Ok(power),
             _ => Err(self.problem(format!(
-                "a power is a whole number from -{LARGEST_POWER} to {LARGEST_POWER} but not 0, found `{ascii}`"
+                "a power is a whole number from -{LARGEST_POWER} to {LARGEST_POWER} but not 0, found \
+                 `{ascii}`"
             ))),
         }
     }

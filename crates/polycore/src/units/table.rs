@@ -16,7 +16,8 @@ static TABLE: LazyLock<UnitTable> = LazyLock::new(|| {
         ($($quantity:ident, $type:ident, $exponents:expr;)+) => {$(
             for unit in uom::si::$quantity::units() {
                 let symbol = unit.abbreviation();
-                let word = !symbol.is_empty() && symbol.chars().all(|c| c.is_alphabetic() || "°%‰".contains(c));
+                let in_word = |c: char| c.is_alphabetic() || "°%‰".contains(c);
+                let word = !symbol.is_empty() && symbol.chars().all(in_word);
                 if !word || symbol.chars().count() > LONGEST_SYMBOL || affine(symbol).is_some() {
                     continue;
                 }
@@ -72,8 +73,8 @@ fn fraction(factor: f64) -> [f64; 2] {
     if exact { [1.0, inverse] } else { [factor, 1.0] }
 }
 
-/// Factor to SI (numerator, denominator) and dimension of one symbol; `um`, `μm` (Greek) and `µm` (micro sign)
-/// are the same.
+/// Factor to SI (numerator, denominator) and dimension of one symbol; `um`, `μm` (Greek) and `µm` (micro
+/// sign) are the same.
 pub(super) fn symbol(text: &str) -> Option<([f64; 2], Exponents)> {
     let direct = TABLE.get(text);
     let micro = || text.strip_prefix(['u', 'μ']).and_then(|rest| TABLE.get(format!("µ{rest}").as_str()));
@@ -91,7 +92,8 @@ pub(super) fn affine(unit: &str) -> Option<(f64, f64)> {
 
 /// The nearest known symbol, for "did you mean".
 pub(super) fn nearest(text: &str) -> Option<String> {
-    const OFTEN: &str = "m mm cm km nm µm kg g mg t s ms min h d K degC N kN mN MN Pa kPa MPa GPa bar kbar atm J kJ mJ MJ W mW kW \
+    const OFTEN: &str = "m mm cm km nm µm kg g mg t s ms min h d K degC N kN mN MN Pa kPa MPa GPa bar kbar \
+                         atm J kJ mJ MJ W mW kW \
                          Hz kHz L mL rad deg % mol A cal eV";
     let names = [
         ("celsius", "degC"),

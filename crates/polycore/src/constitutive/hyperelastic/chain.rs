@@ -10,7 +10,8 @@ use crate::langevin;
 use crate::tensor::Invariants;
 use crate::tensor::deformation::check_stretches;
 
-/// W = (Nkθ/3)√n Σᵢ [λᵢβᵢ + √n ln(βᵢ/sinh βᵢ)], βᵢ = 𝓛⁻¹(λᵢ/√n) (1.25)–(1.26); James & Guth, doi:10.1063/1.1723785.
+/// W = (Nkθ/3)√n Σᵢ [λᵢβᵢ + √n ln(βᵢ/sinh βᵢ)], βᵢ = 𝓛⁻¹(λᵢ/√n) (1.25)–(1.26); James & Guth,
+/// doi:10.1063/1.1723785.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ThreeChain {
     modulus: f64,
@@ -25,8 +26,8 @@ pub struct EightChain {
     links: f64,
 }
 
-/// The eight-chain law plus c(√I₂ − √3): the term that general biaxial data ask for (formulation.md, "Beyond the
-/// thesis"; the term is that of Carroll, J. Elasticity 103 (2011) 173–187).
+/// The eight-chain law plus c(√I₂ − √3): the term that general biaxial data ask for (formulation.md, "Beyond
+/// the thesis"; the term is that of Carroll, J. Elasticity 103 (2011) 173–187).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EightChainRootI2 {
     network: EightChain,
@@ -285,15 +286,17 @@ impl Hyperelastic for EightChainRootI2 {
     }
 }
 
-/// State of one chain at relative extension x = λ/√n: β = 𝓛⁻¹(x) and free energy f = xβ + ln(β/sinh β) per link and kθ.
+/// State of one chain at relative extension x = λ/√n: β = 𝓛⁻¹(x) and free energy f = xβ + ln(β/sinh β) per
+/// link and kθ.
 struct Extension {
     x: f64,
     beta: f64,
 }
 
 impl Extension {
-    /// A chain whose λ² is the mean square of the given stretches, or `None` at and beyond locking. Near locking the
-    /// complement 1 − x = (1 − λ²/n)/(1 + x) carries what x itself cannot; n − λ² is summed in doubled precision.
+    /// A chain whose λ² is the mean square of the given stretches, or `None` at and beyond locking. Near
+    /// locking the complement 1 − x = (1 − λ²/n)/(1 + x) carries what x itself cannot; n − λ² is summed in
+    /// doubled precision.
     fn new(stretches: &[f64], links: f64) -> Option<Self> {
         let count = stretches.len() as f64;
         let full = count * links;

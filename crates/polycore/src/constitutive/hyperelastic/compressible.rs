@@ -44,7 +44,8 @@ pub enum Volumetric {
         /// Lamé's λ, Pa.
         lame: f64,
     },
-    /// U = −p(J − 1): the reaction of an incompressible body under the pressure p (Pa), which no law determines.
+    /// U = −p(J − 1): the reaction of an incompressible body under the pressure p (Pa), which no law
+    /// determines.
     Pressure {
         /// p, positive in compression.
         pressure: f64,
@@ -95,7 +96,8 @@ impl<L: Hyperelastic> Compressible<L> {
     }
 
     /// Bulk modulus of the small-strain limit, (ℂ₁₁₁₁ + 2ℂ₁₁₂₂)/3 at F = 1. It is λ + 2μ/3 only for the
-    /// neo-Hookean law: the invariants of the full stretches add 4(W₁₁ + W₂ + …), 4C₂ for Mooney–Rivlin, 2μ/J_m for Gent.
+    /// neo-Hookean law: the invariants of the full stretches add 4(W₁₁ + W₂ + …), 4C₂ for Mooney–Rivlin,
+    /// 2μ/J_m for Gent.
     ///
     /// # Errors
     /// As [`Hyperelastic::response_at`].

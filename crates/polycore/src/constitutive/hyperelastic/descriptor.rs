@@ -14,7 +14,8 @@ pub struct ModelDescriptor {
     pub kind: ModelKind,
     /// Names, units and domains of the parameters.
     pub parameters: &'static [Parameter],
-    /// The law with the given parameters, as many as [`ModelDescriptor::parameters`]; see [`ModelDescriptor::law`].
+    /// The law with the given parameters, as many as [`ModelDescriptor::parameters`]; see
+    /// [`ModelDescriptor::law`].
     pub(super) build: Build,
     /// Plausible values for a rubber.
     pub example: &'static [f64],
@@ -22,7 +23,8 @@ pub struct ModelDescriptor {
     pub(super) starts: fn(&FitStart<'_>) -> Vec<Vec<f64>>,
     /// Laws that this one becomes at some parameters: it fits no worse than they do.
     pub(super) contains: &'static [Contained],
-    /// Nominal stresses and their derivatives with respect to the parameters, where they are known in closed form.
+    /// Nominal stresses and their derivatives with respect to the parameters, where they are known in closed
+    /// form.
     pub(super) slopes: Option<Slopes>,
     /// Moves parameters along valleys in which the optimiser of all of them is slow.
     pub(super) refine: Option<Refine>,
@@ -36,7 +38,8 @@ pub(super) type Refine = fn(&[f64], &FitStart<'_>) -> Vec<f64>;
 pub(super) struct Contained {
     /// Key of the inner law.
     pub key: &'static str,
-    /// Maps the best parameters of the inner law to those of the outer law at which both agree (or cannot be distinguished), followed by more starting points.
+    /// Maps the best parameters of the inner law to those of the outer law at which both agree (or cannot be
+    /// distinguished), followed by more starting points.
     pub embed: fn(&[f64], &FitStart<'_>) -> Vec<Vec<f64>>,
 }
 

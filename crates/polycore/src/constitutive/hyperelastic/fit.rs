@@ -1,9 +1,9 @@
 //! Least-squares fit of a law to homogeneous states.
 //!
-//! Minimised is the sum of squares of the nominal-stress residuals, over every stress of the table that was measured
-//! (is not exactly zero; [`super::data::TestState::nominal`]). The figure of merit, `rms`, is the root of its mean.
-//! Levenberg–Marquardt in transformed parameters (ln p for positive ones, ln(p/limit − 1) for locking limits) keeps
-//! every iterate in the law's domain; several starts guard against local minima.
+//! Minimised is the sum of squares of the nominal-stress residuals, over every stress of the table that was
+//! measured (is not exactly zero; [`super::data::TestState::nominal`]). The figure of merit, `rms`, is the
+//! root of its mean. Levenberg–Marquardt in transformed parameters (ln p for positive ones, ln(p/limit − 1)
+//! for locking limits) keeps every iterate in the law's domain; several starts guard against local minima.
 
 use std::cell::Cell;
 
@@ -26,8 +26,8 @@ pub struct Fit {
     pub parameters: Vec<FittedParameter>,
     /// Root mean square of the residuals over the measured stresses, Pa.
     pub rms: f64,
-    /// Draws of all parameters from their posterior ([`crate::posterior`]); those that the data do not determine stay at their
-    /// values. Empty where the data determine none.
+    /// Draws of all parameters from their posterior ([`crate::posterior`]); those that the data do not
+    /// determine stay at their values. Empty where the data determine none.
     pub draws: Vec<Vec<f64>>,
     /// Measured stresses.
     pub measurements: usize,
@@ -46,7 +46,9 @@ pub struct FittedParameter {
     pub unit: &'static str,
     /// Value in `unit`.
     pub value: f64,
-    /// Standard error from s²(JᵀJ)⁻¹ at the minimum, s² = Σr²/(m − k). `None` if the data do not determine the parameter: it lies at an end of its domain, which for a locking limit is 1e6 × the least admissible value.
+    /// Standard error from s²(JᵀJ)⁻¹ at the minimum, s² = Σr²/(m − k). `None` if the data do not determine
+    /// the parameter: it lies at an end of its domain, which for a locking limit is 1e6 × the least
+    /// admissible value.
     pub standard_error: Option<f64>,
     /// Verdict of the data on the parameter.
     pub identifiability: Identifiability,
@@ -95,8 +97,8 @@ impl Agreement {
 /// The best fit of a model to a table: never worse than that of a law that it contains.
 ///
 /// # Errors
-/// [`Error::Data`] if the table has fewer measurements than the law has parameters, or a mean stiffness below zero;
-/// [`Error::NoConvergence`] if no start arrives anywhere.
+/// [`Error::Data`] if the table has fewer measurements than the law has parameters, or a mean stiffness below
+/// zero; [`Error::NoConvergence`] if no start arrives anywhere.
 pub fn fit(model: &'static ModelDescriptor, table: &TestData) -> Result<Fit, Error> {
     fit_until(model, table, &|| false)
 }
@@ -203,7 +205,8 @@ pub fn fit_until(
     Ok(Fit { law, model, parameters, rms, draws: found.draws, measurements, iterations, starts })
 }
 
-/// The modulus of the best neo-Hookean law, in closed form: P is linear in μ. Scale and start of every fit. Pa.
+/// The modulus of the best neo-Hookean law, in closed form: P is linear in μ. Scale and start of every fit.
+/// Pa.
 ///
 /// # Errors
 /// [`Error::Data`] where it is not above zero.
@@ -222,7 +225,8 @@ pub fn neo_hookean_modulus(table: &TestData) -> Result<f64, Error> {
         return Ok(modulus);
     }
     let reason = format!(
-        "the data have a mean stiffness of {modulus:.6e} Pa, which must be positive: in tension (stretch above 1) stresses are \
+        "the data have a mean stiffness of {modulus:.6e} Pa, which must be positive: in tension (stretch \
+         above 1) stresses are \
          positive, in compression negative; and a stretch is 1 at rest, a strain 0"
     );
     Err(Error::Data { what: "fit".to_owned(), reason })

@@ -100,7 +100,8 @@ impl<'a> ParameterMap<'a> {
             Domain::Real => (q * self.scale(i), self.scale(i)),
             Domain::Positive => (exponential * self.scale(i), exponential * self.scale(i)),
             Domain::Above(_) => {
-                // never the limit itself, where the energy is infinite, nor beyond what data can tell from infinity
+                // never the limit itself, where the energy is infinite, nor beyond what data can tell from
+                // infinity
                 let excess = self.limits[i] * exponential.clamp(1e-12, UNLIMITED);
                 (self.limits[i] + excess, excess)
             }
@@ -162,7 +163,8 @@ impl<'a> ParameterMap<'a> {
         Some(DMatrix::from_columns(&columns))
     }
 
-    /// Computes the uncertainty of the parameters. Those without effect on the residuals have no standard error; none has if the others are collinear.
+    /// Computes the uncertainty of the parameters. Those without effect on the residuals have no standard
+    /// error; none has if the others are collinear.
     pub fn uncertainty(&self, q: &DVector<f64>, table: &TestData) -> FitUncertainty {
         let mut found = FitUncertainty {
             errors: vec![None; q.len()],

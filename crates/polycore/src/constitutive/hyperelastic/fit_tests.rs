@@ -27,8 +27,8 @@ fn eight_chain_on_treloar() {
 }
 
 /// formulation.md: 0.0898 (8-chain, Kawabata), 0.0748 and 0.0254 MPa (8-chain + c√I₂, Treloar, Kawabata). On
-/// Kawabata the optimum is n → ∞ along a valley so flat that the printed values lie on it, a little short of the end
-/// (0.08966 and 0.02525): half a unit of the last digit below, no more above.
+/// Kawabata the optimum is n → ∞ along a valley so flat that the printed values lie on it, a little short of
+/// the end (0.08966 and 0.02525): half a unit of the last digit below, no more above.
 #[test]
 fn root_i2_is_what_kawabata_asks_for() {
     let of = |key: &str, table: &TestData| fit(model(key).unwrap(), table).unwrap().rms / 1e6;
@@ -40,8 +40,8 @@ fn root_i2_is_what_kawabata_asks_for() {
     assert!(found > 0.0252 && found < 0.02545, "{found}");
 }
 
-/// Upper bounds: an exhaustive scan in numpy, exponents on grids of 0.7 (Treloar) and 0.23 (Kawabata), moduli ≥ 0
-/// solved exactly.
+/// Upper bounds: an exhaustive scan in numpy, exponents on grids of 0.7 (Treloar) and 0.23 (Kawabata), moduli
+/// ≥ 0 solved exactly.
 #[test]
 fn ogden_fits_find_the_global_minimum() {
     for (table, bounds) in
@@ -118,8 +118,10 @@ fn ordinary_data_fit_every_law() {
         .iter()
         .fold("stretch,nominal_MPa\n".into(), |text, l| format!("{text}{l},{}\n", 0.4 * (l - 1.0 / (l * l))));
     // one term suffices: corona radiata, Budday 2017, every fourth digitised point, rounded
-    let brain = "stretch,nominal_kPa\n0.9015,-0.7289\n0.9143,-0.5379\n0.9272,-0.3829\n0.9401,-0.2651\n0.953,-0.1766\n\
-                 0.9659,-0.1114\n0.9788,-0.0595\n0.9917,-0.0227\n1.0147,0.0281\n1.0375,0.0584\n1.0604,0.0851\n1.0832,0.1193\n";
+    let brain = "stretch,nominal_kPa\n0.9015,-0.7289\n0.9143,-0.5379\n0.9272,-0.3829\n0.9401,-0.2651\n\
+                 0.953,-0.1766\n\
+                 0.9659,-0.1114\n0.9788,-0.0595\n0.9917,-0.0227\n1.0147,0.0281\n1.0375,0.0584\n\
+                 1.0604,0.0851\n1.0832,0.1193\n";
     // exact one-term Ogden law in equibiaxial tension, α = 4, and a noisy bar of 300 Pa
     let biaxial: String = (1..12).fold("mode,stretch,nominal_Pa\n".into(), |text, i| {
         let l = 1.0 + 0.1 * f64::from(i);
@@ -162,9 +164,12 @@ fn ordinary_data_fit_every_law() {
 /// Dragon Skin FX Pro, 21 points: scipy from many starts has 0.0019264 MPa at α = −6.0815 and −0.5588.
 #[test]
 fn a_double_exponent_is_no_minimum() {
-    let text = "stretch,nominal_MPa\n1.091,0.0009719\n1.977,0.004658\n2.864,0.007998\n3.75,0.01168\n4.636,0.01662\n\
-                5.523,0.02263\n6.409,0.02936\n7.295,0.03838\n8.182,0.0483\n9.068,0.0599\n9.955,0.0728\n10.841,0.08561\n\
-                11.727,0.1008\n12.614,0.1175\n13.5,0.136\n14.386,0.1564\n15.273,0.1779\n16.159,0.1993\n17.045,0.2209\n\
+    let text = "stretch,nominal_MPa\n1.091,0.0009719\n1.977,0.004658\n2.864,0.007998\n3.75,0.01168\n\
+                4.636,0.01662\n\
+                5.523,0.02263\n6.409,0.02936\n7.295,0.03838\n8.182,0.0483\n9.068,0.0599\n9.955,0.0728\n\
+                10.841,0.08561\n\
+                11.727,0.1008\n12.614,0.1175\n13.5,0.136\n14.386,0.1564\n15.273,0.1779\n16.159,0.1993\n\
+                17.045,0.2209\n\
                 17.932,0.2426\n18.818,0.2613\n";
     let table = TestData::parse("slacker", text).unwrap();
     let found = fit(model("ogden-2").unwrap(), &table).unwrap();
@@ -173,8 +178,9 @@ fn a_double_exponent_is_no_minimum() {
     assert!(three.rms <= found.rms, "{}", three.rms);
 }
 
-/// Treloar's bar in 24 points: scipy's projected search from 150 starts ends at 0.071481 MPa with two terms. With three it follows
-/// the last point to the exponent 159.7 (0.0367 MPa), whose modulus lies below the least one here, 4e-18 of the whole: 0.0482 MPa.
+/// Treloar's bar in 24 points: scipy's projected search from 150 starts ends at 0.071481 MPa with two terms.
+/// With three it follows the last point to the exponent 159.7 (0.0367 MPa), whose modulus lies below the
+/// least one here, 4e-18 of the whole: 0.0482 MPa.
 #[test]
 fn three_terms_on_a_bar() {
     let text = include_str!("../../../../../cases/external/treloar-fits/treloar1944_20C.csv");

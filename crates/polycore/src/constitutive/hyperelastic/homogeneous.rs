@@ -44,8 +44,8 @@ pub fn equibiaxial<L: Hyperelastic + ?Sized>(law: &L, stretch: f64) -> Result<f6
     Ok(biaxial(law, stretch, stretch)?[0])
 }
 
-/// Nominal stresses of a wide strip stretched to λ ("pure shear", planar tension): along the load, and along the
-/// width that is held at its length; Pa.
+/// Nominal stresses of a wide strip stretched to λ ("pure shear", planar tension): along the load, and along
+/// the width that is held at its length; Pa.
 ///
 /// # Errors
 /// As [`biaxial`].
@@ -123,8 +123,8 @@ pub fn plane_stress<L: Hyperelastic + ?Sized>(law: &L, in_plane: &Tensor2) -> Re
 
 const MAX_STEPS: usize = 100;
 
-/// Static condensation of E₃₃ at S₃₃ = 0. The out-of-plane shears do not couple: the law is isotropic and F is
-/// block-diagonal.
+/// Static condensation of E₃₃ at S₃₃ = 0. The out-of-plane shears do not couple: the law is isotropic and F
+/// is block-diagonal.
 fn condensed(
     deformation: DeformationGradient,
     stress: &voigt::Voigt,
@@ -171,7 +171,8 @@ mod tests {
         assert!(incompressible(f64::NAN, 1.0).is_err());
     }
 
-    /// The pressure makes an incompressible law's stress what the tension test has: S from W plus −pJC⁻¹ with S₃₃ = 0.
+    /// The pressure makes an incompressible law's stress what the tension test has: S from W plus −pJC⁻¹ with
+    /// S₃₃ = 0.
     #[test]
     fn pressure_closes_the_incompressible_laws() {
         for model in MODELS {
@@ -190,8 +191,8 @@ mod tests {
         }
     }
 
-    /// A nearly incompressible sheet tends to the incompressible tension test, and its condensed tangent is the derivative
-    /// of its stress.
+    /// A nearly incompressible sheet tends to the incompressible tension test, and its condensed tangent is
+    /// the derivative of its stress.
     #[test]
     fn plane_stress_of_compressible_laws() {
         for model in MODELS {

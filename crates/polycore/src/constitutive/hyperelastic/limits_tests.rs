@@ -35,7 +35,8 @@ fn locking_is_an_error_with_the_value_and_infinite_in_the_limit() {
     let message = gent.energy_at([5.0; 3]).unwrap_err().to_string();
     assert_eq!(message, "Gent: I1 - 3 = 72 has reached the locking value 72");
 
-    // towards locking, with c = 1 − λ/5: β → 1/c, f → ln(2/c) − 1, all finite to the last representable stretch
+    // towards locking, with c = 1 − λ/5: β → 1/c, f → ln(2/c) − 1, all finite to the last representable
+    // stretch
     let rest = three.energy_at([5.0 * (1.0 - 1e-9), 1.0, 1.0]).unwrap();
     let mut worst: f64 = 0.0;
     for c in [1e-3_f64, 1e-6, 1e-9, 1e-12, f64::EPSILON] {

@@ -25,8 +25,8 @@ pub fn model(key: &str) -> Result<&'static ModelDescriptor, Error> {
     MODELS.iter().find(|model| model.key == key).ok_or_else(|| Error::UnknownLaw { name: key.to_owned() })
 }
 
-/// Every law with its example parameters: the incompressible forms, then each with both volumetric terms, then the
-/// compressible forms as printed. The shared check runs over this list.
+/// Every law with its example parameters: the incompressible forms, then each with both volumetric terms,
+/// then the compressible forms as printed. The shared check runs over this list.
 ///
 /// # Errors
 /// None in practice: the examples are valid, and a test holds them to it.

@@ -1,6 +1,7 @@
-//! Ogden's law in its exponents alone: for given exponents the best moduli ≥ 0 follow by linear least squares, so that the search
-//! runs along the valleys in which a modulus and its exponent make up for each other ("variable projection"; Golub & Pereyra,
-//! doi:10.1137/0710036, with Kaufman's derivative, doi:10.1007/BF01932995).
+//! Ogden's law in its exponents alone: for given exponents the best moduli ≥ 0 follow by linear least
+//! squares, so that the search runs along the valleys in which a modulus and its exponent make up for each
+//! other ("variable projection"; Golub & Pereyra, doi:10.1137/0710036, with Kaufman's derivative,
+//! doi:10.1007/BF01932995).
 
 use nalgebra::{DMatrix, DVector};
 

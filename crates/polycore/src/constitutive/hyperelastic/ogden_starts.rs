@@ -1,4 +1,6 @@
-//! Starting points for fits of Ogden's law. The sum of squares has many minima in the exponents, but for given exponents the stress is linear in the moduli: all subsets of a grid of exponents are solved exactly, and the best become starting points.
+//! Starting points for fits of Ogden's law. The sum of squares has many minima in the exponents, but for
+//! given exponents the stress is linear in the moduli: all subsets of a grid of exponents are solved exactly,
+//! and the best become starting points.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -58,8 +60,8 @@ pub(super) fn starts<const TERMS: usize>(start: &FitStart<'_>) -> Vec<Vec<f64>> 
     parameters.collect()
 }
 
-/// A law of one term less as a start, its new term absent; and with a new term of an exponent of the grid that lowers the
-/// misfit, the best three.
+/// A law of one term less as a start, its new term absent; and with a new term of an exponent of the grid
+/// that lowers the misfit, the best three.
 pub(super) fn grown(smaller: &[f64], start: &FitStart<'_>) -> Vec<Vec<f64>> {
     let total: f64 = smaller.chunks_exact(2).map(|term| term[0]).sum();
     let mut all = vec![[smaller, &[ABSENT * total, 1.0]].concat()];
@@ -106,7 +108,8 @@ fn column(start: &FitStart<'_>, exponent: f64) -> Option<DVector<f64>> {
     Some(DVector::from_vec(values)).filter(|column| column.norm().is_finite() && column.norm() > 0.0)
 }
 
-/// The exponents whose stresses are finite in the data, those stresses of unit moduli, and the data in units of the modulus.
+/// The exponents whose stresses are finite in the data, those stresses of unit moduli, and the data in units
+/// of the modulus.
 fn columns(start: &FitStart<'_>) -> (Vec<f64>, Vec<DVector<f64>>, DVector<f64>) {
     let grid = EXPONENTS.iter().rev().map(|a| -a).chain(EXPONENTS);
     let (exponents, columns) =

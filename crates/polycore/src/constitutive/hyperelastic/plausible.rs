@@ -28,8 +28,8 @@ const HELD: f64 = 0.95;
 /// Turns compressive stresses that are counted positive, and leaves out what follows the break of a specimen.
 ///
 /// # Errors
-/// A row, and what would be allowed there: strains that are stretches or in per cent, stretches that are strains,
-/// stresses against the strain.
+/// A row, and what would be allowed there: strains that are stretches or in per cent, stretches that are
+/// strains, stresses against the strain.
 pub(super) fn plausible(
     rows: &mut Vec<TestRow>,
     notes: &mut Vec<String>,
@@ -45,7 +45,8 @@ pub(super) fn plausible(
         return Err((row.index, allowed.to_owned()));
     }
     if strain && !said && !has_unit && called_strain(rows, largest) {
-        let allowed = "a strain, 0 at rest; these are 1 where the stress is 0: is this a stretch? Head it `stretch`, or write \
+        let allowed = "a strain, 0 at rest; these are 1 where the stress is 0: is this a stretch? Head it \
+                       `stretch`, or write \
                        `strain = \"stretch\"`";
         return Err((rows[0].index, allowed.to_owned()));
     }
@@ -64,13 +65,15 @@ pub(super) fn plausible(
             rows.iter_mut().for_each(|row| row.nominal[0] = 0.0 - row.nominal[0]);
             notes.push("stresses of compression, positive in the file, are taken as negative".to_owned());
         } else if measure == StrainMeasure::Stretch && against.iter().all(|row| positive(row)) {
-            let allowed = "a stretch, 1 at rest, whose stress is negative below 1; is this a strain? Head it `strain`, or write \
+            let allowed = "a stretch, 1 at rest, whose stress is negative below 1; is this a strain? Head \
+                           it `strain`, or write \
                            `strain = \"engineering\"`";
             return Err((row.index, allowed.to_owned()));
         } else {
             let (stress, stretch) = (row.nominal[0], row.stretches[0]);
             let allowed = format!(
-                "a stress of the sign of the strain (the stiffness would be negative: {stress} Pa at the stretch {stretch}); in \
+                "a stress of the sign of the strain (the stiffness would be negative: {stress} Pa at the \
+                 stretch {stretch}); in \
                  compression both are negative"
             );
             return Err((row.index, allowed));
@@ -99,8 +102,8 @@ fn slope(rows: &[TestRow]) -> f64 {
     rows.iter().map(|row| (row.stretches[0] - x) * (row.nominal[0] - y)).sum()
 }
 
-/// Leaves out rows after the largest stress of each specimen in tension where the stress falls and the specimen is not
-/// unloaded.
+/// Leaves out rows after the largest stress of each specimen in tension where the stress falls and the
+/// specimen is not unloaded.
 fn leave_out_tails(rows: &mut Vec<TestRow>, notes: &mut Vec<String>, mode: Mode) {
     let places: Vec<usize> = (0..rows.len()).filter(|&i| rows[i].mode == mode).collect();
     let strain = |i: usize| rows[i].stretches[0] - 1.0;
@@ -131,7 +134,8 @@ fn leave_out_tails(rows: &mut Vec<TestRow>, notes: &mut Vec<String>, mode: Mode)
     }
     if let (Some(first), count) = (lost.first(), lost.len()) {
         notes.push(format!(
-            "{count} rows after the largest stress are left out, from the stretch {:.4} on: the stress falls, as where a specimen \
+            "{count} rows after the largest stress are left out, from the stretch {:.4} on: the stress \
+             falls, as where a specimen \
              breaks",
             rows[*first].stretches[0]
         ));

@@ -33,8 +33,8 @@ pub(super) const MOONEY_RIVLIN: ModelDescriptor = ModelDescriptor {
     key: "mooney-rivlin",
     kind: ModelKind::Phenomenological,
     parameters: &[
-        // fits keep to the polyconvex quadrant: the best fit to Treloar's bar, 0.39 and −0.72 MPa, has a negative
-        // shear modulus
+        // fits keep to the polyconvex quadrant: the best fit to Treloar's bar, 0.39 and −0.72 MPa, has a
+        // negative shear modulus
         Parameter { name: "C1", unit: "Pa", domain: Domain::Positive },
         Parameter { name: "C2", unit: "Pa", domain: Domain::Positive },
     ],

@@ -55,9 +55,10 @@ impl TestData {
         Self::parse_as(name, text.as_bytes().to_vec(), &TestFormat::default()).map(|reading| reading.table)
     }
 
-    /// Reads a table as [`crate::table`] does: a column of stretches or strains and one of stresses, with a column of the
-    /// [`Mode`] or for one test; or two of each (`stretch_1`, `stretch_2`, `nominal_1 [MPa]`, …). A strain is an engineering
-    /// one and a stress a nominal one where neither heading nor `meaning` says more. Blank stresses were not measured.
+    /// Reads a table as [`crate::table`] does: a column of stretches or strains and one of stresses, with a
+    /// column of the [`Mode`] or for one test; or two of each (`stretch_1`, `stretch_2`, `nominal_1 [MPa]`,
+    /// …). A strain is an engineering one and a stress a nominal one where neither heading nor `meaning` says
+    /// more. Blank stresses were not measured.
     ///
     /// # Errors
     /// [`crate::Error::Io`], and what [`TestData::parse_as`] refuses.
@@ -70,9 +71,9 @@ impl TestData {
     /// Parses the bytes of a file as [`TestData::read_as`] does.
     ///
     /// # Errors
-    /// [`Error::Data`] with line and column: headings, units and modes that are not known or leave several possibilities,
-    /// what is no number, a stretch that is not positive, strains that look like stretches or the other way round, a
-    /// stiffness below zero, no measurement at all.
+    /// [`Error::Data`] with line and column: headings, units and modes that are not known or leave several
+    /// possibilities, what is no number, a stretch that is not positive, strains that look like stretches or
+    /// the other way round, a stiffness below zero, no measurement at all.
     pub fn parse_as(name: &str, bytes: Vec<u8>, meaning: &TestFormat) -> Result<ImportedTest, Error> {
         let file = table::Table::parse(name, bytes).map_err(located)?;
         let columns = TestColumns::of(&file, meaning).map_err(located)?;
@@ -105,7 +106,8 @@ struct TestColumns {
     stresses: Vec<TestColumn<TestStressMeasure>>,
 }
 
-const LAYOUTS: &str = "a strain (`stretch`, `strain [%]`) and a stress (`nominal [MPa]`), with a `mode` in each row if there are \
+const LAYOUTS: &str = "a strain (`stretch`, `strain [%]`) and a stress (`nominal [MPa]`), with a `mode` in \
+                       each row if there are \
                        several tests, or `stretch_1`, `stretch_2`, `nominal_1 [MPa]`, `nominal_2 [MPa]`";
 
 impl TestColumns {
@@ -133,7 +135,8 @@ impl TestColumns {
         let (stress_1, strain_2) =
             (place(0, &|what| stress(what).is_some()), place(1, &|what| strain(what).is_some()));
         if biaxial && stress_1.zip(strain_2).is_some_and(|(stress, strain)| stress < strain) {
-            let allowed = "`strain_column` and `stress_column` in the data's entry, if these are specimens side by side (an entry \
+            let allowed = "`strain_column` and `stress_column` in the data's entry, if these are specimens \
+                           side by side (an entry \
                            each); of a biaxial test both strains before both stresses";
             return Err(file.refuse_headings(allowed));
         }
@@ -168,7 +171,8 @@ impl TestColumns {
         }
         let (first, other) = (&strains[0], &stresses[0]);
         if first.assumed && other.measure == TestStressMeasure::True && !other.assumed {
-            let allowed = "`strain = \"engineering\"` or `strain = \"true\"` in the data's entry: the stress is a true one";
+            let allowed = "`strain = \"engineering\"` or `strain = \"true\"` in the data's entry: the \
+                           stress is a true one";
             return Err(file.refuse_headings(allowed));
         }
         if other.assumed && first.measure == StrainMeasure::True && !first.assumed {
@@ -189,10 +193,13 @@ impl TestColumns {
         let unit = |chosen: &TestColumn<TestStressMeasure>| {
             let text = chosen.unit.as_deref().or(meaning.stress_unit.as_deref()).unwrap_or_default();
             Unit::<StressDimension>::parse(&plain_unit(text)).map_err(|error| {
-                let what = format!("unit of column {}, `{}`", chosen.column + 1, file.headings[chosen.column].text);
+                let what =
+                    format!("unit of column {}, `{}`", chosen.column + 1, file.headings[chosen.column].text);
                 let found = if text.is_empty() { "no unit" } else { text };
-                let allowed =
-                    format!("a unit of stress in the heading, as in `nominal [MPa]`, or `stress_unit = \"MPa\"`; {error}");
+                let allowed = format!(
+                    "a unit of stress in the heading, as in `nominal [MPa]`, or `stress_unit = \
+                             \"MPa\"`; {error}"
+                );
                 file.refuse(file.layout().heading_line, &what, found.to_owned(), &allowed)
             })
         };
@@ -260,7 +267,8 @@ impl TestColumns {
                     StrainMeasure::True => written.exp(),
                 };
                 if !(stretch > 0.0 && stretch.is_finite()) {
-                    let strain = "a stretch above 0; if this is a strain, head it `strain` or write `strain = \"engineering\"`";
+                    let strain = "a stretch above 0; if this is a strain, head it `strain` or write `strain \
+                                  = \"engineering\"`";
                     let allowed = if chosen.measure == StrainMeasure::Stretch {
                         strain
                     } else {
@@ -438,7 +446,8 @@ fn choose<M: Copy + PartialEq>(
             Err(file.refuse_headings(format!("{LAYOUTS}{}", if raw { advice } else { "" })))
         }
         _ => Err(file.refuse_headings(format!(
-            "one {key}, or `{key}_column = \"…\"` in the data's entry with one of these headings, or its number"
+            "one {key}, or `{key}_column = \"…\"` in the data's entry with one of these headings, or its \
+             number"
         ))),
     }
 }

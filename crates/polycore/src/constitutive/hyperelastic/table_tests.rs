@@ -70,7 +70,8 @@ fn strains_and_stresses_of_laboratories() {
 /// Names of tests, compression of either sign, and a test that only the scene names.
 #[test]
 fn tests_and_compression() {
-    let text = "Test;Specimen;Strain (%);Stress (MPa)\nuniaxial;1;25;0.5\nPlanar tension;1;25;0.5\nbiaxial;2;25;0.5\n\
+    let text = "Test;Specimen;Strain (%);Stress (MPa)\nuniaxial;1;25;0.5\nPlanar \
+                tension;1;25;0.5\nbiaxial;2;25;0.5\n\
                 Uniaxial compression;1;20;0.4\n";
     let reading = plain(text);
     let found: Vec<(Mode, f64, f64)> =

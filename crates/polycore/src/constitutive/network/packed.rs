@@ -1,9 +1,10 @@
 //! Weights in the order in which the kernel reads them, and the kernel.
 //!
-//! Outputs stand in panels of [`SimdLanes::PANEL`](super::real::SimdLanes::PANEL); within a panel come all inputs, one row of
-//! the panel's width each. A product goes through the inputs once, with the sums of a panel for several columns
-//! (a value and its slopes, or several points) in registers, and skips inputs that are 0 in all columns, as many are
-//! after a `relu`. Each sum is taken in the order of the inputs, whatever the number of columns: the same bits.
+//! Outputs stand in panels of [`SimdLanes::PANEL`](super::real::SimdLanes::PANEL); within a panel come all
+//! inputs, one row of the panel's width each. A product goes through the inputs once, with the sums of a
+//! panel for several columns (a value and its slopes, or several points) in registers, and skips inputs that
+//! are 0 in all columns, as many are after a `relu`. Each sum is taken in the order of the inputs, whatever
+//! the number of columns: the same bits.
 
 use super::real::{Real, SimdLanes};
 use aligned_vec::{AVec, ConstAlign};
@@ -66,8 +67,8 @@ impl<T: Real> PackedMatrix<T> {
         }
     }
 
-    /// W x + b for each column of x, b only in the first `biased` of them; columns lie `stride` apart, those of the
-    /// result as far as the padded number of outputs.
+    /// W x + b for each column of x, b only in the first `biased` of them; columns lie `stride` apart, those
+    /// of the result as far as the padded number of outputs.
     #[inline(always)]
     pub fn product<S: Simd>(
         &self,
@@ -82,8 +83,8 @@ impl<T: Real> PackedMatrix<T> {
             1 => self.columns::<S, 1>(simd, active, x, stride, biased, all, out),
             2..=4 => self.columns::<S, 4>(simd, active, x, stride, biased, all, out),
             5 | 6 => self.columns::<S, 6>(simd, active, x, stride, biased, all, out),
-            // sixteen registers: two vectors of outputs for six columns at most, or loads are the limit; two panels after one another,
-            // which further columns find in the nearest cache
+            // sixteen registers: two vectors of outputs for six columns at most, or loads are the limit; two
+            // panels after one another, which further columns find in the nearest cache
             _ if in_panel::<T, S>() == 4 => {
                 for panel in all.clone().step_by(2) {
                     let pair = panel..all.end.min(panel + 2);

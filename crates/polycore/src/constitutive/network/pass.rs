@@ -90,7 +90,8 @@ impl<T: Real> Tape<T> {
     }
 }
 
-/// Runs a pass with the widest instructions of this machine; returns the second derivatives, zero if not wanted.
+/// Runs a pass with the widest instructions of this machine; returns the second derivatives, zero if not
+/// wanted.
 pub(super) fn run<T: Real>(network: &Network<T>, want: PassOutput, tape: &mut Tape<T>) -> Curvature<T> {
     Arch::new().dispatch(NetworkPass { network, want, tape })
 }
@@ -216,7 +217,8 @@ fn activate<T: Real, const FUSED: bool>(
     }
 }
 
-/// Computes the gradient by reverse mode, from the sums a of each layer and the adjoints g = ∂out/∂y of its activations y = σ(a), and H = Σ g σ″(a) (∂a/∂x)(∂a/∂x)ᵀ over all neurons.
+/// Computes the gradient by reverse mode, from the sums a of each layer and the adjoints g = ∂out/∂y of its
+/// activations y = σ(a), and H = Σ g σ″(a) (∂a/∂x)(∂a/∂x)ᵀ over all neurons.
 #[inline(always)]
 fn backward<T: Real, S: Simd>(
     simd: S,

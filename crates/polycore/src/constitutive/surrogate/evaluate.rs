@@ -13,7 +13,8 @@ use nalgebra::{SMatrix, SVector};
 pub struct Features {
     /// Standardised inputs (3.8); the first of them count.
     pub values: [f64; LANES],
-    /// Derivatives of the invariants of an energy, not yet standardised, with respect to the six components of C, C₁₂ counted once.
+    /// Derivatives of the invariants of an energy, not yet standardised, with respect to the six components
+    /// of C, C₁₂ counted once.
     pub slopes: [[f64; 6]; LANES],
 }
 
@@ -94,8 +95,8 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         Ok(())
     }
 
-    /// S and the tangent 2 ∂S/∂C at each C with their uncertainty: the bits of [`Surrogate::tangent`], one after the other
-    /// (a tangent fills the registers by itself).
+    /// S and the tangent 2 ∂S/∂C at each C with their uncertainty: the bits of [`Surrogate::tangent`], one
+    /// after the other (a tangent fills the registers by itself).
     ///
     /// # Errors
     /// Those of [`Surrogate::tangent`], with the place in the list; a list of predictions of another length.
@@ -137,7 +138,8 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         self.combine(c, memory.parts.iter(), tangent.then_some(&slope))
     }
 
-    /// The mean of the members, each without its value and stress at rest; `slope`: the sum of their second derivatives.
+    /// The mean of the members, each without its value and stress at rest; `slope`: the sum of their second
+    /// derivatives.
     fn combine<'a>(
         &self,
         c: &SVector<T, 6>,

@@ -11,7 +11,8 @@ fn turned() -> [[f64; 3]; 3] {
     [0, 1, 2].map(|i| [0, 1, 2].map(|j| q[(i, j)]))
 }
 
-/// Builds a model of every kind with random weights, smooth activations, ensembles, rotated axes and scaled inputs: properties by construction hold for them, and exporters can be tested with them.
+/// Builds a model of every kind with random weights, smooth activations, ensembles, rotated axes and scaled
+/// inputs: properties by construction hold for them, and exporters can be tested with them.
 ///
 /// # Errors
 /// Only those of [`Surrogate::random`].

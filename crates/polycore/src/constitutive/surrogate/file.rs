@@ -1,7 +1,7 @@
 //! Models as files: safetensors with a header in JSON.
 //!
-//! Metadata `mdsurrogate law 1`: the [`Header`] as JSON. Tensors `member0.layer0.weight` (outputs, inputs) and
-//! `member0.layer0.bias` (outputs), F64 or F32, little endian, for each member and layer.
+//! Metadata `mdsurrogate law 1`: the [`Header`] as JSON. Tensors `member0.layer0.weight` (outputs, inputs)
+//! and `member0.layer0.bias` (outputs), F64 or F32, little endian, for each member and layer.
 
 use super::{Header, Surrogate};
 use crate::constitutive::Error;
@@ -31,8 +31,8 @@ impl Surrogate<f64> {
     /// Reads a law; numbers come back to the bit.
     ///
     /// # Errors
-    /// [`Error::File`] for what is no safetensors file or has no header of ours, and for weights that do not fit the
-    /// architecture of the header; I/O errors.
+    /// [`Error::File`] for what is no safetensors file or has no header of ours, and for weights that do not
+    /// fit the architecture of the header; I/O errors.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, crate::Error> {
         let path = path.as_ref();
         let size = std::fs::metadata(path).map_err(crate::Error::from_io("read", path))?.len();
@@ -162,7 +162,11 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
+        #![proptest_config(ProptestConfig {
+            cases: 400,
+            failure_persistence: None,
+            ..ProptestConfig::default()
+        })]
 
         /// Changed, lost and surplus bytes, most of them in the header: an error or a law, never a panic.
         #[test]
@@ -173,7 +177,8 @@ mod tests {
             digits in any::<bool>(),
         ) {
             let mut bytes = law();
-            let length = if header { u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize + 8 } else { bytes.len() };
+            let header_length = u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize + 8;
+            let length = if header { header_length } else { bytes.len() };
             for (place, byte) in changes {
                 let at = (place * length as f64) as usize;
                 // digits for digits keep the JSON well formed
@@ -197,7 +202,8 @@ mod tests {
         assert!(text.contains("polyconvex") && text.contains("support"));
         // a file without the newer entries is the law it was
         let old = "{\"kind\":{\"energy\":{\"symmetry\":\"isotropic\",\"axes\":[[1,0,0],[0,1,0],[0,0,1]]}},\
-            \"architecture\":{\"widths\":[3,1],\"activations\":[\"linear\"]},\"members\":1,\"input_mean\":[0,0,0],\
+            \"architecture\":{\"widths\":[3,1],\"activations\":[\"linear\"]},\"members\":1,\
+             \"input_mean\":[0,0,0],\
             \"input_deviation\":[1,1,1],\"output_mean\":[0],\"output_deviation\":[1],\
             \"training_box\":[[1,1],[1,1],[1,1],[0,0],[0,0],[0,0]],\"spread_limit\":null}";
         let header: Header = serde_json::from_str(old).unwrap();

@@ -28,7 +28,8 @@ pub enum Kind {
         /// True if W is polyconvex by construction: see [`Kind::non_negative`].
         #[serde(default)]
         polyconvex: bool,
-        /// True if ‖F‖ = √I₁ and ‖cof F‖ = √I₂ replace their squares as inputs of a polyconvex isotropic energy: it is convex in F and cof F too, and may grow as slowly as the first power of a stretch.
+        /// True if ‖F‖ = √I₁ and ‖cof F‖ = √I₂ replace their squares as inputs of a polyconvex isotropic
+        /// energy: it is convex in F and cof F too, and may grow as slowly as the first power of a stretch.
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         norms: bool,
     },
@@ -40,8 +41,8 @@ impl Kind {
         Self::Energy { symmetry, axes: AXES, polyconvex: false, norms: false }
     }
 
-    /// A polyconvex energy in the axes of the data: convex in (F, cof F, J), and so elliptic everywhere; it cannot follow
-    /// data that soften (Ball 1976, <https://doi.org/10.1007/BF00279992>).
+    /// A polyconvex energy in the axes of the data: convex in (F, cof F, J), and so elliptic everywhere; it
+    /// cannot follow data that soften (Ball 1976, <https://doi.org/10.1007/BF00279992>).
     pub fn polyconvex_energy(symmetry: Symmetry) -> Self {
         Self::Energy { symmetry, axes: AXES, polyconvex: true, norms: false }
     }
@@ -56,9 +57,12 @@ impl Kind {
         matches!(self, Self::Energy { polyconvex: true, .. })
     }
 
-    /// Returns true if the weight of `layer` (0 follows the inputs) for its input `input` must not be negative, so that a polyconvex energy is convex and increasing in all its inputs but J, the last one, whose weight may have any sign.
+    /// Returns true if the weight of `layer` (0 follows the inputs) for its input `input` must not be
+    /// negative, so that a polyconvex energy is convex and increasing in all its inputs but J, the last one,
+    /// whose weight may have any sign.
     ///
-    /// With convex increasing activations (`softplus`, `relu`, `elu`, `linear`) a network of such weights is input-convex (Amos et al. 2017, <https://arxiv.org/abs/1609.07152>).
+    /// With convex increasing activations (`softplus`, `relu`, `elu`, `linear`) a network of such weights is
+    /// input-convex (Amos et al. 2017, <https://arxiv.org/abs/1609.07152>).
     pub fn non_negative(&self, layer: usize, input: usize) -> bool {
         self.is_polyconvex() && (layer > 0 || input + 1 < self.inputs())
     }
@@ -105,12 +109,15 @@ pub struct Header {
     pub output_mean: Vec<f64>,
     /// Unit of each output, Pa (J/m³).
     pub output_deviation: Vec<f64>,
-    /// Least and greatest C of each component in the training data; equal where a component was never seen to change.
+    /// Least and greatest C of each component in the training data; equal where a component was never seen to
+    /// change.
     pub training_box: [[f64; 2]; 6],
-    /// Representatives of the training strains, farther from which than any training row a prediction is flagged.
+    /// Representatives of the training strains, farther from which than any training row a prediction is
+    /// flagged.
     #[serde(default)]
     pub support: Option<Support>,
-    /// Spread of the ensemble, Pa, beyond which a prediction is flagged ([`super::Surrogate::with_spread_limit`]).
+    /// Spread of the ensemble, Pa, beyond which a prediction is flagged
+    /// ([`super::Surrogate::with_spread_limit`]).
     pub spread_limit: Option<f64>,
     /// Softening of an energy on unloading.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -9,12 +9,14 @@ use crate::constitutive::network::Real;
 pub struct SymmetryInvariants {
     list: &'static [&'static [Monomial<'static>]],
     names: &'static [&'static str],
-    /// Index of the first invariant that is the root of its polynomial: J = √det C is the last of the polyconvex ones.
+    /// Index of the first invariant that is the root of its polynomial: J = √det C is the last of the
+    /// polyconvex ones.
     first_root: usize,
 }
 
 impl SymmetryInvariants {
-    /// Creates the invariants of a symmetry, or its polyconvex ones (empty if it has none). With `norms` the roots of I₁ and I₂ replace them in a polyconvex isotropic energy.
+    /// Creates the invariants of a symmetry, or its polyconvex ones (empty if it has none). With `norms` the
+    /// roots of I₁ and I₂ replace them in a polyconvex isotropic energy.
     pub fn new(symmetry: Symmetry, polyconvex: bool, norms: bool) -> Self {
         let (list, names) = match polyconvex {
             true => (symmetry.polyconvex_invariants().unwrap_or_default(), symmetry.names(true)),

@@ -64,7 +64,8 @@ fn convex_in_deformation_cofactor_and_volume() {
     }
 }
 
-/// No loss of ellipticity anywhere. Energies without the restriction lose it somewhere, so the check can fail.
+/// No loss of ellipticity anywhere. Energies without the restriction lose it somewhere, so the check can
+/// fail.
 #[test]
 fn waves_have_real_speeds() {
     let mut random = SplitMix64::new(9);

@@ -8,13 +8,14 @@ use serde::{Deserialize, Serialize};
 /// (m/m₀)^c at most.
 const BEYOND: f64 = 1e12;
 
-/// Pseudo-elasticity (Ogden and Roxburgh 1999, <https://doi.org/10.1098/rspa.1999.0431>) with a monotone network in place of
-/// their error function: S = (1 − d) 2 ∂W/∂C with
+/// Pseudo-elasticity (Ogden and Roxburgh 1999, <https://doi.org/10.1098/rspa.1999.0431>) with a monotone
+/// network in place of their error function: S = (1 − d) 2 ∂W/∂C with
 ///
 /// > d = 1 − exp(−Σₖ aₖ tanh(bₖ (1 − W/m)) (m/m₀)^cₖ), aₖ, bₖ, cₖ ≥ 0,
 ///
-/// where m is the greatest W of the history. While W grows beyond it, d = 0; d grows as W falls, and with m at any W, so that
-/// no cycle gains work. A small c is damage from the first strain on, a large one that of chains which break near m₀.
+/// where m is the greatest W of the history. While W grows beyond it, d = 0; d grows as W falls, and with m
+/// at any W, so that no cycle gains work. A small c is damage from the first strain on, a large one that of
+/// chains which break near m₀.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Softening {
@@ -121,8 +122,8 @@ mod tests {
         Voigt::new(stretch * stretch, 1.0, 1.0, 0.05 * (stretch - 1.0), 0.0, 0.0)
     }
 
-    /// Loading is that of the energy; after it the stress is lower, in a cycle work is lost, and a second cycle below the
-    /// greatest energy follows one curve.
+    /// Loading is that of the energy; after it the stress is lower, in a cycle work is lost, and a second
+    /// cycle below the greatest energy follows one curve.
     #[test]
     fn unloads_below_the_curve_of_loading() {
         let (law, mut memory, mut history) = (law(), Workspace::default(), SofteningHistory::default());

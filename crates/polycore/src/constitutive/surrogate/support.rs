@@ -1,8 +1,9 @@
 //! Coverage of the training data: representatives of their strains, and the distance of a C from them.
 //!
-//! A box says nothing about the gaps in it: paths are lines through six dimensions. Representatives are training rows
-//! chosen one after the other, each the row farthest from those before it (Gonzalez 1985,
-//! <https://doi.org/10.1016/0304-3975(85)90224-5>), so that no row is farther from them than [`Support::radius`].
+//! A box says nothing about the gaps in it: paths are lines through six dimensions. Representatives are
+//! training rows chosen one after the other, each the row farthest from those before it (Gonzalez 1985,
+//! <https://doi.org/10.1016/0304-3975(85)90224-5>), so that no row is farther from them than
+//! [`Support::radius`].
 
 use crate::constitutive::Error;
 use crate::constitutive::network::Real;
@@ -25,8 +26,9 @@ pub struct Support {
     pub points: Vec<[f64; 6]>,
     /// Inverse standard deviation of each component of C in the training data; 0 where it never changed.
     pub weights: [f64; 6],
-    /// The greatest distance of a training row from its nearest representative, in standard deviations; of few rows,
-    /// most of which are representatives, the greatest distance of a row from its nearest neighbour.
+    /// The greatest distance of a training row from its nearest representative, in standard deviations; of
+    /// few rows, most of which are representatives, the greatest distance of a row from its nearest
+    /// neighbour.
     pub radius: f64,
 }
 
@@ -74,8 +76,9 @@ impl Support {
                 *distance = distance.min(square(row, &rows[farthest]));
             }
         }
-        // where most rows are representatives themselves, that distance is that of the closest rows, or none, and every
-        // new strain would be far: there the limit is the greatest distance of a row from its neighbour
+        // where most rows are representatives themselves, that distance is that of the closest rows, or none,
+        // and every new strain would be far: there the limit is the greatest distance of a row from its
+        // neighbour
         if 2 * points.len() > rows.len() {
             let others = |k: usize| rows.iter().enumerate().filter(move |(j, _)| *j != k).map(|(_, row)| row);
             let neighbour =

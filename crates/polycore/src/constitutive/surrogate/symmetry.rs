@@ -1,8 +1,9 @@
 //! Invariants of each material symmetry, as polynomials in the six components of C.
 //!
-//! Invariants are written as sums of monomials in [C₁₁, C₂₂, C₃₃, C₁₂, C₁₃, C₂₃] in the material's own axes, whose
-//! derivatives are then exact by rule. Bases: Boehler 1987 (<https://doi.org/10.1007/978-3-7091-2810-7>),
-//! Smith 1962 (<https://doi.org/10.1007/BF00281203>) for monoclinic and orthotropic.
+//! Invariants are written as sums of monomials in [C₁₁, C₂₂, C₃₃, C₁₂, C₁₃, C₂₃] in the material's own axes,
+//! whose derivatives are then exact by rule. Bases: Boehler 1987
+//! (<https://doi.org/10.1007/978-3-7091-2810-7>), Smith 1962 (<https://doi.org/10.1007/BF00281203>) for
+//! monoclinic and orthotropic.
 
 use crate::constitutive::Error;
 use crate::tensor::{Tensor, Voigt6x6, voigt};
@@ -18,7 +19,8 @@ pub type Monomial<'a> = (f64, &'a [usize]);
 pub enum Symmetry {
     /// No symmetry: the six components of C.
     Triclinic,
-    /// A two-fold axis along the third material axis, as γ-PA12's unique axis b along the chains (point group 2/m).
+    /// A two-fold axis along the third material axis, as γ-PA12's unique axis b along the chains (point group
+    /// 2/m).
     Monoclinic,
     /// Three perpendicular two-fold axes.
     Orthotropic,
@@ -94,8 +96,9 @@ impl Symmetry {
         }
     }
 
-    /// The same in functions that are convex in (F, cof F, J): |F aᵢ|² = aᵢ·C aᵢ and |cof F aᵢ|² = aᵢ·cof C aᵢ or their
-    /// sums, and last J² (whose root is the input). None where too few are known: triclinic and monoclinic.
+    /// The same in functions that are convex in (F, cof F, J): |F aᵢ|² = aᵢ·C aᵢ and |cof F aᵢ|² = aᵢ·cof C
+    /// aᵢ or their sums, and last J² (whose root is the input). None where too few are known: triclinic and
+    /// monoclinic.
     ///
     /// Schröder & Neff 2003, <https://doi.org/10.1016/S0020-7683(02)00458-4>.
     pub fn polyconvex_invariants(self) -> Option<&'static [&'static [Monomial<'static>]]> {
@@ -129,7 +132,8 @@ impl Symmetry {
         }
     }
 
-    /// Terms with which a polyconvex energy removes its stress at rest, of the form p 1 + Σ s a⊗a in the material axes.
+    /// Terms with which a polyconvex energy removes its stress at rest, of the form p 1 + Σ s a⊗a in the
+    /// material axes.
     pub fn stress_at_rest(self) -> StressAtRest {
         match self {
             Self::Orthotropic => StressAtRest {
