@@ -24,7 +24,7 @@ pub enum Error {
         /// The reason given by the operating system.
         source: io::Error,
     },
-    /// The output directory cannot be used; found before any computation.
+    /// The output directory cannot be used; detected before any computation.
     #[error("the output directory {} cannot be used: {reason}", path.display())]
     OutputDirectory {
         /// The directory.
@@ -32,7 +32,7 @@ pub enum Error {
         /// Why.
         reason: String,
     },
-    /// A file exists but its content is not what it should be.
+    /// A file with invalid content.
     #[error("{} is not a valid {format}: {reason}", path.display())]
     Format {
         /// The file.
@@ -74,7 +74,7 @@ pub enum Error {
         /// The output directory of the run.
         output: PathBuf,
     },
-    /// A sweep was asked to stop; what its runs have done is kept.
+    /// A sweep was asked to stop; finished runs are kept.
     #[error("interrupted; the same command continues with the results in {}", .0.display())]
     SweepInterrupted(PathBuf),
     /// A number outside the range on which an operation is defined.
@@ -97,13 +97,13 @@ pub enum Error {
         /// The last residual.
         residual: f64,
     },
-    /// A matrix that is no deformation gradient.
+    /// Invalid deformation gradient.
     #[error(transparent)]
     Tensor(#[from] crate::tensor::Error),
-    /// A constitutive law, its fit, table or file.
+    /// Error of a constitutive law, its fit, table or file.
     #[error(transparent)]
     Constitutive(#[from] constitutive::Error),
-    /// A table of numbers that cannot be read.
+    /// Table of numbers that cannot be read.
     #[cfg(feature = "tables")]
     #[error(transparent)]
     Table(#[from] crate::table::Error),
@@ -132,7 +132,7 @@ impl Error {
         move |source| Self::Io { operation, path, source }
     }
 
-    /// Exit code of the command lines: 2 for bad input (what cannot be read, an unusable output directory or
+    /// Exit code of the command lines: 2 for bad input (an unreadable file, an unusable output directory or
     /// checkpoint), 130 for an interrupted run, 1 for a failed one.
     pub fn exit_code(&self) -> u8 {
         match self {

@@ -1,4 +1,4 @@
-//! Whole files on disk, never half-written ones.
+//! Atomic writing of files.
 
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
@@ -57,19 +57,19 @@ pub fn prepare_directory(directory: impl AsRef<Path>) -> Result<(), Error> {
     })
 }
 
-/// Makes a rename last; best effort, since not every system can synchronise a directory.
+/// Synchronises a directory so that a rename is durable; best effort, since not every system can.
 pub fn sync_directory(directory: &Path) {
     if let Ok(handle) = File::open(directory) {
         let _ = handle.sync_all();
     }
 }
 
-/// A file's name without its folder.
+/// File name without its folder.
 pub fn name_of(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Directory of a file: `.` where its path names none.
+/// Directory of a file, or `.` if its path names none.
 pub fn parent(path: &Path) -> &Path {
     path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }

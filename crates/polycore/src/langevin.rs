@@ -1,4 +1,4 @@
-//! The Langevin function 𝓛(β) = coth β − 1/β of chain statistics, its inverse, and what they give to
+//! The Langevin function 𝓛(β) = coth β − 1/β of chain statistics, its inverse, and the energies that follow.
 //! energies.
 //!
 //! A chain of n rigid links at relative extension x = r/(n b) ∈ (−1, 1) carries the dimensionless force

@@ -18,7 +18,7 @@ pub use conjugate_gradients::conjugate_gradients;
 pub use groups::Groups;
 pub use sets::DisjointSets;
 
-/// Sum of the values of work items in their order, whatever thread computes them.
+/// Sums the values of work items in their order, whichever thread computes them.
 #[cfg(feature = "solvers")]
 pub fn ordered_sum(items: impl rayon::iter::IndexedParallelIterator<Item = f64>) -> f64 {
     items.collect::<Vec<_>>().iter().sum()

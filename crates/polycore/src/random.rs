@@ -1,5 +1,5 @@
-//! A generator of pseudo-random numbers whose sequence never changes between versions: splits and shuffles
-//! are named by their seed.
+//! Pseudo-random numbers whose sequence never changes between versions: splits and shuffles are reproduced
+//! from their seed.
 
 /// SplitMix64 (Steele, Lea & Flood 2014, <https://doi.org/10.1145/2660193.2660195>).
 #[derive(Debug, Clone)]
@@ -8,12 +8,12 @@ pub struct SplitMix64 {
 }
 
 impl SplitMix64 {
-    /// Any seed will do.
+    /// Creates a generator; any seed will do.
     pub fn new(seed: u64) -> Self {
         Self { state: seed }
     }
 
-    /// 64 bits.
+    /// Next 64 bits.
     pub fn next_u64(&mut self) -> u64 {
         self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.state;
@@ -45,7 +45,7 @@ impl SplitMix64 {
         }
     }
 
-    /// Fisher–Yates.
+    /// Shuffles by Fisher–Yates.
     pub fn shuffle<T>(&mut self, items: &mut [T]) {
         for last in (1..items.len()).rev() {
             items.swap(last, self.below(last + 1));

@@ -1,9 +1,9 @@
 //! Tables of measured numbers, as programs and laboratories write them.
 //!
-//! [`Table::read`] finds out by itself how a file is written: its encoding (UTF-8, UTF-16, Latin-1),
-//! separator (tab, `;`, `,`, blanks), decimal sign, the line of headings below any lines of metadata, and a
-//! row of units. Headings are `name [unit]`, `name (unit)`, `name/unit` or `name` over a unit. What was found
-//! is said in one line ([`Table::describe`]), and stands in every error.
+//! [`Table::read`] detects the layout of a file: its encoding (UTF-8, UTF-16, Latin-1), separator (tab, `;`,
+//! `,`, blanks), decimal sign, the line of headings below any lines of metadata, and a row of units. Headings
+//! are `name [unit]`, `name (unit)`, `name/unit` or `name` over a unit. [`Table::describe`] states the layout
+//! in one line, and so does every error.
 //!
 //! ```
 //! use polycore::table::Table;
@@ -29,13 +29,13 @@ use std::path::{Path, PathBuf};
 pub use heading::{Heading, plain_unit, plainly};
 pub use layout::{Decimal, Layout, Separator};
 
-/// Why a table cannot be read.
+/// Error of reading a table.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{}{}: {what}: found {found:?}; allowed: {allowed}", path.display(), place(*line))]
 pub struct Error {
     /// The file.
     pub path: PathBuf,
-    /// Line, from 1; 0 where it is the file as a whole.
+    /// Line, from 1; 0 for the file as a whole.
     pub line: usize,
     /// Column, row, headings or file.
     pub what: String,
@@ -56,7 +56,7 @@ pub struct Table {
     /// The columns.
     pub headings: Vec<Heading>,
     layout: Layout,
-    /// Lines above the headings, and comments among the rows, as they stand there.
+    /// Lines above the headings, and comments among the rows.
     pub remarks: Vec<String>,
     /// The text of all cells, where each ends, the first of each row and one more, and the line of each row.
     cells: String,
@@ -76,10 +76,10 @@ impl Table {
         Ok(Self::parse(path, bytes)?)
     }
 
-    /// Reads what a file holds.
+    /// Parses the bytes of a file.
     ///
     /// # Errors
-    /// What is no text, a table without headings, and a row that has another number of cells than the
+    /// Bytes that are no text, a table without headings, a row with another number of cells than the
     /// headings.
     pub fn parse(path: impl AsRef<Path>, bytes: Vec<u8>) -> Result<Self, Error> {
         let path = path.as_ref();
@@ -169,13 +169,13 @@ impl Table {
         self.lines[row]
     }
 
-    /// The column of exactly this name, the first of several.
+    /// First column of exactly this name.
     pub fn find(&self, name: &str) -> Option<usize> {
         self.headings.iter().position(|heading| heading.name == name)
     }
 
-    /// The columns of the first of some names that there is: exactly or, if none is, apart from capitals,
-    /// dots and dashes; single letters (t is a time, T a temperature) only exactly.
+    /// Columns of the first of some names that exists: an exact match or, if there is none, a match without
+    /// regard to capitals, dots and dashes; single letters (t is a time, T a temperature) match only exactly.
     pub fn matching(&self, names: &[&str]) -> Vec<usize> {
         let all = |test: &dyn Fn(&Heading) -> bool| -> Vec<usize> {
             (0..self.headings.len()).filter(|&i| test(&self.headings[i])).collect()
@@ -186,10 +186,10 @@ impl Table {
         exact.chain(plain).find(|found| !found.is_empty()).unwrap_or_default()
     }
 
-    /// The one column of some names, the first of which is for errors.
+    /// Finds the only column with one of some names, the first of which appears in errors.
     ///
     /// # Errors
-    /// None or several of them.
+    /// No such column, or several.
     pub fn require_column(&self, names: &[&str]) -> Result<usize, Error> {
         let found = self.matching(names);
         match found[..] {
@@ -198,26 +198,26 @@ impl Table {
         }
     }
 
-    /// An error about the headings, all of which it names.
+    /// Creates an error about the headings, with all of them.
     pub fn refuse_headings(&self, allowed: impl Into<String>) -> Error {
         let texts: Vec<&str> = self.headings.iter().map(|heading| heading.text.as_str()).collect();
         let (line, found) = (self.layout.heading_line, texts.join(","));
         self.refuse(line, "headings", found, &allowed.into())
     }
 
-    /// An error, with how the table was understood.
+    /// Creates an error, with the layout of the table.
     pub fn refuse(&self, line: usize, what: &str, found: String, allowed: &str) -> Error {
         let allowed = format!("{allowed} ({})", self.layout);
         Error { path: self.path.clone(), line, what: what.to_owned(), found, allowed }
     }
 
-    /// An error about a cell.
+    /// Creates an error about a cell.
     pub fn refuse_cell(&self, row: usize, column: usize, allowed: &str) -> Error {
         let what = format!("column {}, `{}`", column + 1, self.headings[column].text);
         self.refuse(self.lines[row], &what, self.text(row, column).to_owned(), allowed)
     }
 
-    /// A cell, without the blanks around it.
+    /// Text of a cell, without the blanks around it.
     pub fn text(&self, row: usize, column: usize) -> &str {
         let cell = self.firsts[row] + column;
         if cell >= self.firsts[row + 1] {
@@ -227,10 +227,10 @@ impl Table {
         &self.cells[start..self.ends[cell]]
     }
 
-    /// A finite number, in the unit of its column.
+    /// Finite number of a cell, in the unit of its column.
     ///
     /// # Errors
-    /// The cell is blank or anything else.
+    /// A cell that is blank or not a finite number.
     pub fn number(&self, row: usize, column: usize) -> Result<f64, Error> {
         let text = self.text(row, column);
         let number = self.layout.decimal.number(text).filter(|number| number.is_finite());
@@ -247,10 +247,10 @@ impl Table {
         if blank { Ok(None) } else { self.number(row, column).map(Some) }
     }
 
-    /// The unit of a column: that of its heading, or the one given for headings without.
+    /// Unit of a column: that of its heading, or `default` for headings without.
     ///
     /// # Errors
-    /// A unit of another dimension than `D`, none where one is needed.
+    /// A unit of another dimension than `D`, no unit if one is needed.
     pub fn unit<D: Dimension>(&self, column: usize, default: Option<&str>) -> Result<Unit<D>, Error> {
         let heading = &self.headings[column];
         let unit = heading.unit.as_deref().or(default).unwrap_or_default();

@@ -26,7 +26,7 @@ pub type Tensor = nalgebra::Matrix3<f64>;
 /// A second-order tensor in two dimensions.
 pub type Tensor2 = nalgebra::Matrix2<f64>;
 
-/// Why a matrix is no deformation gradient.
+/// Error of a matrix that is no deformation gradient.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -40,7 +40,7 @@ pub enum Error {
         /// Value of the component.
         value: f64,
     },
-    /// det F ≤ 0: the material is turned inside out or squeezed to nothing.
+    /// det F ≤ 0: the material is inverted or has no volume.
     #[error("the deformation gradient has determinant {determinant:e}; it must be positive")]
     Inverted {
         /// det F.

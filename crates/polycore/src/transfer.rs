@@ -1,5 +1,5 @@
-//! Fields of one discretisation on another: from the hexahedra of a mesh to the particles of a body, and
-//! back, by the volume that cells and particles have in common.
+//! Transfer of fields between discretisations: from the hexahedra of a mesh to the particles of a body, and
+//! back, weighted by the common volume of cells and particles.
 //!
 //! A particle is an axis-parallel box. Each part that a cell and a box have in common has a volume V and a
 //! place, the natural coordinates of its middle in the cell. Then
@@ -19,11 +19,11 @@ use crate::Error;
 use crate::numerics::hexahedron::{CORNERS, shapes};
 use crate::numerics::{Groups, bounds};
 
-/// Corners this far from those of a box, over its edges, still make one.
+/// Distance of corners from those of a box, over its edges, up to which a cell counts as a box.
 const ALIGNED: f64 = 1e-9;
-/// Boxes that overlap by less than this of an edge touch: rounding.
+/// Overlap, over an edge, below which boxes only touch: rounding.
 const TOUCHING: f64 = 1e-11;
-/// Pieces of a general hexahedron along an axis, at most.
+/// Largest number of pieces of a general hexahedron along an axis.
 const MOST_PIECES: f64 = 16.0;
 
 /// An axis-parallel box.
@@ -41,7 +41,7 @@ impl Cuboid {
         (0..3).map(|d| self.max[d] - self.min[d]).product()
     }
 
-    /// The box around points.
+    /// Bounding box of points.
     pub fn bounding(points: &[[f64; 3]]) -> Self {
         let [min, max] = bounds(points.iter().copied());
         Self { min, max }
@@ -53,16 +53,16 @@ impl Cuboid {
 struct OverlapPart {
     cell: u32,
     volume: f64,
-    /// Natural coordinates of its middle in the cell.
+    /// Natural coordinates of its centre in the cell.
     place: [f64; 3],
 }
 
-/// The parts of a mesh in boxes.
+/// Intersections of the cells of a mesh with boxes.
 #[derive(Clone, Debug)]
 pub struct Overlap {
     cells: Vec<[u32; 8]>,
     nodes: usize,
-    /// The parts of each box.
+    /// Intersections of each box.
     parts: Groups<OverlapPart>,
 }
 
@@ -136,17 +136,17 @@ impl Overlap {
         self.parts.group(index).iter().map(|part| part.volume).sum()
     }
 
-    /// Nodes of the cells that have a part in a box.
+    /// Nodes of the cells that intersect a box.
     pub fn nodes_of(&self, index: usize) -> impl Iterator<Item = u32> + '_ {
         self.parts.group(index).iter().flat_map(|part| self.cells[part.cell as usize])
     }
 
-    /// Cells that have a part in a box.
+    /// Cells that intersect a box.
     pub fn cells_of(&self, index: usize) -> impl Iterator<Item = u32> + '_ {
         self.parts.group(index).iter().map(|part| part.cell)
     }
 
-    /// Means over the boxes of a field over cells; `None` where the mesh does not reach.
+    /// Computes means over the boxes of a field over cells; `None` outside the mesh.
     ///
     /// # Errors
     /// [`Error::Data`]: another number of values than cells.
@@ -155,8 +155,7 @@ impl Overlap {
         Ok(self.means(|part| values[part.cell as usize]))
     }
 
-    /// Means over the boxes of a field over nodes, trilinear in each cell; `None` where the mesh does not
-    /// reach.
+    /// Computes means over the boxes of a field over nodes, trilinear in each cell; `None` outside the mesh.
     ///
     /// # Errors
     /// [`Error::Data`]: another number of values than nodes.
@@ -168,7 +167,7 @@ impl Overlap {
         }))
     }
 
-    /// Means over the cells of a field over boxes; `None` where no box reaches.
+    /// Computes means over the cells of a field over boxes; `None` outside the boxes.
     ///
     /// # Errors
     /// [`Error::Data`]: another number of values than boxes.
@@ -185,8 +184,8 @@ impl Overlap {
         Ok(sums.into_iter().map(mean).collect())
     }
 
-    /// Values of nodes from a field over boxes: Σ V N_a v / Σ V N_a over the parts of all boxes, the lumped
-    /// projection, which keeps the integral Σ_a v_a ∫N_a dV; `None` where no box reaches.
+    /// Computes nodal values from a field over boxes: Σ V N_a v / Σ V N_a over all intersections, the lumped
+    /// projection, which keeps the integral Σ_a v_a ∫N_a dV; `None` outside the boxes.
     ///
     /// # Errors
     /// [`Error::Data`]: another number of values than boxes.
@@ -316,7 +315,7 @@ fn gauss_points(corners: &[[f64; 3]; 8], number: u32, n: usize) -> Vec<(OverlapP
     points
 }
 
-/// Boxes by the place of their middles, in bins as large as the largest box.
+/// Boxes sorted by their centres into bins as large as the largest box.
 struct Bins {
     origin: [f64; 3],
     edge: [f64; 3],
@@ -360,12 +359,12 @@ impl Bins {
         a + self.counts[0] * (b + self.counts[1] * c)
     }
 
-    /// Visits boxes that may reach into `bounds`, each once.
+    /// Visits boxes that may intersect `bounds`, each once.
     fn within(&self, bounds: &Cuboid, visit: &mut dyn FnMut(usize)) {
         if self.boxes.items().is_empty() {
             return;
         }
-        // middles of boxes that reach in lie at most half an edge outside
+        // centres of intersecting boxes lie at most half an edge outside
         let low = self.bin(std::array::from_fn(|d| bounds.min[d] - 0.51 * self.edge[d]));
         let high = self.bin(std::array::from_fn(|d| bounds.max[d] + 0.51 * self.edge[d]));
         for c in low[2]..=high[2] {
@@ -376,7 +375,7 @@ impl Bins {
         }
     }
 
-    /// Pieces along an axis of a cell: at most half a box each.
+    /// Number of pieces of a cell along each axis: at most half a box each.
     fn pieces(&self, bounds: &Cuboid) -> usize {
         let ratio = |d: usize| 2.0 * (bounds.max[d] - bounds.min[d]) / self.least[d];
         (0..3).map(ratio).fold(1.0, f64::max).ceil().min(MOST_PIECES) as usize

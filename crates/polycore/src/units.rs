@@ -54,7 +54,7 @@ impl<D: Dimension> Quantity<D> {
         Self { si, dimension: PhantomData }
     }
 
-    /// The value in coherent SI units.
+    /// Value in coherent SI units.
     pub const fn si(self) -> f64 {
         self.si
     }
@@ -77,7 +77,7 @@ impl<D: Dimension> FromStr for Quantity<D> {
     }
 }
 
-/// A unit of a dimension `D`, read once and then used for many numbers: those of a column of a table.
+/// Unit of a dimension `D`, read once and then used for many numbers, e.g. a column of a table.
 #[derive(Clone, Debug)]
 pub struct Unit<D> {
     text: String,
@@ -88,15 +88,15 @@ pub struct Unit<D> {
 }
 
 impl<D: Dimension> Unit<D> {
-    /// Reads a unit; the empty text is that of dimensionless numbers.
+    /// Reads a unit; the empty text is the unit of dimensionless numbers.
     ///
     /// # Errors
-    /// An unknown unit, another dimension than `D`, no unit where one is needed.
+    /// An unknown unit, another dimension than `D`, no unit if one is needed.
     pub fn parse(unit: &str) -> Result<Self, UnitError> {
         Self::within(unit.trim(), unit)
     }
 
-    /// The unit at the end of a text, for whose errors the whole of it is given.
+    /// Reads the unit at the end of a text; errors show the whole text.
     fn within(unit: &str, whole: &str) -> Result<Self, UnitError> {
         let new = |numerator, denominator, zero| Self {
             text: unit.to_owned(),
@@ -121,7 +121,7 @@ impl<D: Dimension> Unit<D> {
         }
     }
 
-    /// The quantity of that many units.
+    /// Creates the quantity of `number` units.
     ///
     /// # Errors
     /// Numbers that over- or underflow in SI units, and temperatures below absolute zero.
@@ -166,7 +166,7 @@ impl<'de, D: Dimension> Deserialize<'de> for Quantity<D> {
     }
 }
 
-/// A text `NUMBER UNIT`; a bare number too where there is no unit.
+/// Text `NUMBER UNIT`; also a bare number if the quantity has no unit.
 #[cfg(feature = "schemars")]
 impl<D: Dimension> schemars::JsonSchema for Quantity<D> {
     fn schema_name() -> std::borrow::Cow<'static, str> {
@@ -260,7 +260,7 @@ macro_rules! dimensions {
             pub type $alias = Quantity<dimension::$marker>;
         )+
 
-        /// Exponents and names, in the order of declaration: the first that fits names what was found.
+        /// Exponents and names in the order of declaration; the first match names a quantity.
         const NAMES: &[(Exponents, &str)] = &[$(($exponents, $name)),+];
     };
 }

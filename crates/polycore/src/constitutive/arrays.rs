@@ -1,4 +1,4 @@
-//! Laws at many points, and data of fits, as arrays (feature `ndarray`): views go in, arrays come out.
+//! Laws and fits on arrays (feature `ndarray`): array views as input, arrays as output.
 
 use super::hyperelastic::data::{Mode, TestData, TestState};
 use super::law::same_length;
@@ -13,20 +13,20 @@ pub struct Predictions {
     pub stress: Array2<f64>,
     /// ℂ = 2 ∂S/∂C, (N, 6, 6), Pa; if requested.
     pub tangent: Option<Array3<f64>>,
-    /// W, (N), J/m³; none of a law that has no energy.
+    /// W, (N), J/m³; `None` for a law without an energy.
     pub energy: Option<Array1<f64>>,
-    /// Spread of an ensemble, (N), Pa; 0 of other laws.
+    /// Spread of an ensemble, (N), Pa; 0 for other laws.
     pub spread: Array1<f64>,
-    /// Standard deviation of each component of S over an ensemble, (N, 6), Pa; 0 of other laws.
+    /// Standard deviation of each component of S over an ensemble, (N, 6), Pa; 0 for other laws.
     pub deviation: Array2<f64>,
     /// Reasons for uncertainty, (N).
     pub flags: Array1<Flags>,
 }
 
-/// S, and ℂ if `tangent`, at each row of C, (N, 6), in the order 11, 22, 33, 12, 13, 23.
+/// Computes S, and ℂ if `tangent`, at each row of C, (N, 6), in the order 11, 22, 33, 12, 13, 23.
 ///
 /// # Errors
-/// [`Error::Invalid`] for another number of columns; what the law refuses.
+/// [`Error::Invalid`] for another number of columns; errors of the law.
 pub fn predict(law: &dyn Law, c: ArrayView2<'_, f64>, tangent: bool) -> Result<Predictions, Error> {
     let points = rows(c, "C")?;
     let mut all = vec![Prediction::default(); points.len()];
@@ -53,7 +53,7 @@ pub fn predict(law: &dyn Law, c: ArrayView2<'_, f64>, tangent: bool) -> Result<P
     })
 }
 
-/// Voigt vectors of an array (N, 6); `name` is what a message calls it.
+/// Converts an array (N, 6) to Voigt vectors; `name` appears in messages.
 ///
 /// # Errors
 /// [`Error::Invalid`] for another number of columns.
@@ -65,12 +65,12 @@ pub fn rows(array: ArrayView2<'_, f64>, name: &'static str) -> Result<Vec<Voigt>
 }
 
 impl TestData {
-    /// Stretches, (N), and nominal stresses, (N) in Pa, of a test that one stretch describes; a stress of
-    /// exactly 0 is a condition, not a measurement.
+    /// Creates test data from stretches, (N), and nominal stresses, (N) in Pa, of a test that one stretch
+    /// describes; a stress of exactly 0 is a condition, not a measurement.
     ///
     /// # Errors
     /// [`Error::Invalid`] for arrays of two lengths; [`Error::Deformation`] for a stretch that is not
-    /// positive; [`Error::Data`] where no stress was measured.
+    /// positive; [`Error::Data`] if no stress was measured.
     pub fn from_arrays(
         mode: Mode,
         stretch: ArrayView1<'_, f64>,

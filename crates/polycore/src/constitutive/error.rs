@@ -7,7 +7,7 @@ use std::path::PathBuf;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A material parameter outside its domain.
+    /// Material parameter outside its domain.
     #[error("{law}: {parameter} = {value} is outside {allowed}")]
     Parameter {
         /// The law.
@@ -45,7 +45,7 @@ pub enum Error {
         /// The law.
         law: String,
     },
-    /// No law of that name.
+    /// Unknown name of a law.
     #[error("there is no hyperelastic law `{name}`")]
     UnknownLaw {
         /// The name requested.
@@ -64,7 +64,7 @@ pub enum Error {
     /// A fit was stopped on request.
     #[error("stopped on request")]
     Stopped,
-    /// Data that no law can be fitted to.
+    /// Data to which no law can be fitted.
     #[error("{what}: {reason}")]
     Data {
         /// The file, table or row.
@@ -72,7 +72,7 @@ pub enum Error {
         /// Defect of the data.
         reason: String,
     },
-    /// A C that is no deformation, or a part of a model that does not fit the others.
+    /// Invalid C, or a part of a model that does not fit the others.
     #[error("{name}: found {found}; allowed: {allowed}")]
     Invalid {
         /// Name of the quantity.
@@ -82,7 +82,7 @@ pub enum Error {
         /// Allowed values.
         allowed: String,
     },
-    /// A file that holds no model.
+    /// File without a valid model.
     #[error("{}: found {found}; allowed: {allowed}", path.display())]
     File {
         /// The file.
@@ -92,7 +92,7 @@ pub enum Error {
         /// Expected content.
         allowed: String,
     },
-    /// The deformation is not admissible.
+    /// Inadmissible deformation.
     #[error(transparent)]
     Deformation(#[from] tensor::Error),
 }

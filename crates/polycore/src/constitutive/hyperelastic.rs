@@ -61,7 +61,7 @@ pub use yeoh::Yeoh;
 
 /// An isotropic hyperelastic law. Stresses and moduli in Pa, energies in J/m³.
 pub trait Hyperelastic: Send + Sync {
-    /// The law's name, for tables and messages.
+    /// Name of the law, for tables and messages.
     fn name(&self) -> String;
 
     /// Names and values of the parameters, in the order of the constructor.
@@ -83,7 +83,7 @@ pub trait Hyperelastic: Send + Sync {
     /// As [`Hyperelastic::energy_at`].
     fn response_at(&self, stretches: [f64; 3]) -> Result<PrincipalResponse, Error>;
 
-    /// The factor g of −g ln J in the compressible form that the thesis prints, if it prints one.
+    /// Factor g of −g ln J in the compressible form of the thesis; `None` if the thesis has none.
     fn published_coupling(&self) -> Option<f64> {
         None
     }
@@ -166,7 +166,7 @@ fn principal<L: Hyperelastic + ?Sized>(
     Ok((frame, response))
 }
 
-/// `value` if it satisfies the rule, the error otherwise.
+/// Returns `value` if it satisfies the rule, the error otherwise.
 fn parameter(
     law: &'static str,
     parameter: &str,
@@ -185,7 +185,7 @@ fn positive(law: &'static str, name: &str, value: f64) -> Result<f64, Error> {
     parameter(law, name, value, value > 0.0, "(0, ∞)")
 }
 
-/// An energy that left the range of `f64` becomes an error.
+/// Returns an error if an energy left the range of `f64`.
 fn finite(law: &'static str, stretches: [f64; 3], energy: f64) -> Result<f64, Error> {
     check_stretches(&stretches)?;
     if energy.is_finite() { Ok(energy) } else { Err(Error::Overflow { law, stretches }) }

@@ -6,7 +6,7 @@ use crate::tensor::{DeformationGradient, Voigt, Voigt6x6, voigt};
 use nalgebra::{SMatrix, SVector, Scalar};
 use std::any::Any;
 
-/// A law of an elastic solid, C → (W, S, ℂ), objective since it is a function of C = FᵀF alone.
+/// Law of an elastic solid, C → (W, S, ℂ), objective since it is a function of C = FᵀF alone.
 ///
 /// Voigt vectors and tangents follow [`crate::tensor::voigt`]; Pa and J/m³. A law may have no energy (a
 /// stress learnt as a function of C has none), and S(1) need not vanish: incompressible laws leave the
@@ -15,22 +15,22 @@ pub trait Law: Send + Sync {
     /// Name of the law, for tables and messages.
     fn name(&self) -> String;
 
-    /// W and S at C. Allocates nothing once `memory` has served the same law.
+    /// Computes W and S at C. Allocates nothing once `memory` has served the same law.
     ///
     /// # Errors
-    /// A C that is not positive definite, or where the law has no finite stress.
+    /// A C that is not positive definite, or without a finite stress.
     fn stress(&self, c: &Voigt, memory: &mut Workspace) -> Result<Prediction, Error>;
 
-    /// W, S and ℂ = 2 ∂S/∂C at C. Allocates nothing once `memory` has served the same law.
+    /// Computes W, S and ℂ = 2 ∂S/∂C at C. Allocates nothing once `memory` has served the same law.
     ///
     /// # Errors
     /// As [`Law::stress`].
     fn tangent(&self, c: &Voigt, memory: &mut Workspace) -> Result<Prediction, Error>;
 
-    /// W and S at each C, to the same bits as one by one.
+    /// Computes W and S at each C, with the same bits as one by one.
     ///
     /// # Errors
-    /// As [`Law::stress`]; another number of predictions than of C.
+    /// As [`Law::stress`]; unequal numbers of predictions and of C.
     fn stresses(
         &self,
         c: &[Voigt],
@@ -44,7 +44,7 @@ pub trait Law: Send + Sync {
         Ok(())
     }
 
-    /// σ = FSFᵀ/J at F = `deformation`, with the prediction at C = FᵀF that it comes from.
+    /// Computes σ = FSFᵀ/J at F = `deformation`, with the prediction at C = FᵀF.
     ///
     /// # Errors
     /// As [`Law::stress`].
@@ -57,9 +57,9 @@ pub trait Law: Send + Sync {
         Ok((voigt::cauchy_from_material(deformation, &prediction.stress), prediction))
     }
 
-    /// Bulk and shear modulus of the tangent at C = 1, of a law without stress there: Voigt's averages over
-    /// all directions (Proc. of Hill 1952, doi:10.1088/0370-1298/65/5/307, Eq. 4–5), exact for an isotropic
-    /// law.
+    /// Bulk and shear modulus of the tangent at C = 1, for a law without stress there: Voigt's averages over
+    /// all all directions (Proc. of Hill 1952, doi:10.1088/0370-1298/65/5/307, Eq. 4–5), exact for an
+    /// isotropic law.
     ///
     /// # Errors
     /// As [`Law::stress`].
@@ -92,16 +92,16 @@ pub struct Prediction<T: Scalar = f64> {
     /// ℂ = 2 ∂S/∂C, Pa, in the Voigt order without factors (dS = ℂ dE with doubled shear strains); if
     /// requested.
     pub tangent: Option<SMatrix<T, 6, 6>>,
-    /// W, J/m³; none of a law that has no energy.
+    /// W, J/m³; `None` for a law without an energy.
     pub energy: Option<T>,
     /// Root mean square over the members of an ensemble of the norm of their distance from the mean, Pa; 0
-    /// for one. It is the norm of `deviation`: √Σₐ sₐ².
+    /// for a single model. It is the norm of `deviation`: √Σₐ sₐ².
     pub spread: T,
     /// Standard deviation over the M members of each component of S, sₐ = √(Σₘ (Sₐᵐ − Sₐ)²/M), Pa, in the
     /// order of `stress`; 0 for one member. It belongs to these axes: in others it needs the members'
     /// covariance.
     pub deviation: SVector<T, 6>,
-    /// Reasons for uncertainty; none of a law in closed form.
+    /// Reasons for uncertainty; none for a law in closed form.
     pub flags: Flags,
 }
 
@@ -131,7 +131,7 @@ impl Flags {
 pub struct Workspace(Option<Box<dyn Any + Send>>);
 
 impl Workspace {
-    /// Works with the `M` that is kept here, a new one at first.
+    /// Calls `work` with the stored `M`, a new one at first.
     #[inline]
     pub fn with<M: Default + Send + 'static, R>(&mut self, work: impl FnOnce(&mut M) -> R) -> R {
         let kept = self.0.take().and_then(|kept| kept.downcast::<M>().ok());
@@ -149,7 +149,7 @@ pub(super) fn same_length(points: usize, predictions: usize) -> Result<(), Error
     Err(Error::invalid("predictions", predictions, format!("{points}, one for each C")))
 }
 
-/// The laws of Chapter 1, at the principal stretches and directions of C.
+/// Laws of Chapter 1, at the principal stretches and directions of C.
 impl<L: Hyperelastic + ?Sized> Law for L {
     fn name(&self) -> String {
         Hyperelastic::name(self)

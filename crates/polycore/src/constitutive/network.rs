@@ -19,13 +19,13 @@ pub use real::Real;
 use packed::PackedMatrix;
 use pass::PassOutput;
 
-/// Most inputs of a network whose derivatives are requested: the lanes of one row of a Jacobian.
+/// Largest number of inputs of a network with derivatives: the lanes of one row of a Jacobian.
 pub const LANES: usize = 8;
 
-/// Most neurons in a layer: a file that claims more is damaged.
+/// Largest number of neurons in a layer: a file with more is damaged.
 pub const MOST_NEURONS: usize = 1 << 16;
 
-/// Widths from input to output, and what each layer after the input does.
+/// Widths from input to output, and the activation of each layer after the input.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Architecture {
@@ -36,7 +36,7 @@ pub struct Architecture {
 }
 
 impl Architecture {
-    /// The networks of Table 3.4, from 1 to 4: six inputs, six linear outputs.
+    /// Returns network 1 to 4 of Table 3.4: six inputs, six linear outputs.
     ///
     /// # Errors
     /// [`Error::Invalid`] for another number.
@@ -52,7 +52,7 @@ impl Architecture {
         Ok(Self::new(6, hidden, 6))
     }
 
-    /// Hidden layers between inputs and linear outputs.
+    /// Creates hidden layers between inputs and linear outputs.
     pub fn new(inputs: usize, hidden: &[(usize, Activation)], outputs: usize) -> Self {
         let mut widths = vec![inputs];
         widths.extend(hidden.iter().map(|(width, _)| *width));
@@ -62,11 +62,13 @@ impl Architecture {
         Self { widths, activations }
     }
 
-    /// Weights and biases.
+    /// Number of weights and biases.
     pub fn parameters(&self) -> usize {
         self.widths.windows(2).map(|pair| (pair[0] + 1) * pair[1]).sum()
     }
 
+    /// Checks the widths and activations.
+    ///
     /// # Errors
     /// [`Error::Invalid`] for no layer, an empty or absurdly wide one, or another number of activations.
     pub fn check(&self) -> Result<(), Error> {
@@ -93,7 +95,7 @@ pub struct Layer<T> {
     pub activation: Activation,
 }
 
-/// A multilayer perceptron (3.9).
+/// Multilayer perceptron (3.9).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Network<T> {
     architecture: Architecture,
@@ -103,7 +105,7 @@ pub struct Network<T> {
 }
 
 impl<T: Real> Network<T> {
-    /// A network of these layers.
+    /// Creates a network of these layers.
     ///
     /// # Errors
     /// [`Error::Invalid`] for sizes that do not fit the architecture, or a weight that is not finite.
@@ -139,8 +141,8 @@ impl<T: Real> Network<T> {
         Self { architecture, layers, packed, transposed }
     }
 
-    /// Glorot's uniform weights, ±√(6/(inputs + outputs)), and no bias, as Keras begins; the same seed gives
-    /// the same network.
+    /// Creates a network with Glorot's uniform weights, ±√(6/(inputs + outputs)), and no bias, as Keras does;
+    /// the same seed gives the same network.
     ///
     /// # Errors
     /// [`Architecture::check`].
@@ -168,7 +170,7 @@ impl<T: Real> Network<T> {
         &self.layers
     }
 
-    /// The same network in another precision.
+    /// Converts the network to another precision.
     pub fn convert<U: Real>(&self) -> Network<U> {
         let list = |values: &[T]| values.iter().map(|value| U::from_f64(value.to_f64())).collect();
         let layer = |layer: &Layer<T>| Layer {
@@ -179,7 +181,7 @@ impl<T: Real> Network<T> {
         Network::packed(self.architecture.clone(), self.layers.iter().map(layer).collect())
     }
 
-    /// The outputs at `input`; surplus inputs are not read, missing ones count as 0.
+    /// Computes the outputs at `input`; surplus inputs are not read, missing ones count as 0.
     pub fn forward<'t>(&self, input: &[T], tape: &'t mut Tape<T>) -> &'t [T] {
         tape.fit(self);
         tape.set_input(0, input);

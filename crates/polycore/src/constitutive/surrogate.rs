@@ -44,11 +44,10 @@ use crate::tensor::{Voigt, Voigt6x6};
 use nalgebra::SVector;
 use support::Nearest;
 
-/// A difference from a component that never changed in the training data that counts as rounding: ten times
-/// that of f32.
+/// Tolerance for components that never changed in the training data: ten times the rounding of f32.
 pub const UNSEEN: f64 = 1e-6;
 
-/// A law C → S in one of two precisions.
+/// Law C → S in one of two precisions.
 #[derive(Debug, Clone)]
 pub struct Surrogate<T: Real = f64> {
     header: Header,
@@ -106,7 +105,7 @@ pub struct Coefficients<'a, T> {
 }
 
 impl<T: Real + nalgebra::Scalar> Surrogate<T> {
-    /// A law from its header and the networks of its members.
+    /// Builds a law from its header and the networks of its members.
     ///
     /// # Errors
     /// [`Header::check`]; [`Error::Invalid`] for another number of networks or another architecture, axes
@@ -169,9 +168,9 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         Ok(law)
     }
 
-    /// A law with random weights ([`Network::random`], seeds `seed`, `seed` + 1, …). Where
-    /// [`Kind::non_negative`] asks for it they are |w|/√n with n inputs: a sum of n numbers of one sign is √n
-    /// times as large as one of both signs.
+    /// Creates a law with random weights ([`Network::random`], seeds `seed`, `seed` + 1, …). Weights that
+    /// [`Kind::non_negative`] restricts are |w|/√n with n inputs: a sum of n numbers of one sign is √n times
+    /// as large as one of both signs.
     ///
     /// # Errors
     /// Those of [`Surrogate::new`].
@@ -195,9 +194,9 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         Self::new(header, members)
     }
 
-    /// The correction of member m. Of a polyconvex energy it is polyconvex itself: with S(I) = Σ sᵢ aᵢ⊗aᵢ in
-    /// the material axes, add ½|sᵢ| (aᵢ·Caᵢ − 1) for sᵢ < 0 and ½sᵢ (aᵢ·cof C aᵢ − 1) − sᵢ(J − 1) for sᵢ > 0,
-    /// since 2 ∂(aᵢ·cof C aᵢ)/∂C = 2(1 − aᵢ⊗aᵢ) and 2 ∂J/∂C = 1 at I (after Linden et al. 2023,
+    /// Computes the correction of member m. For a polyconvex energy it is polyconvex itself: with S(I) = Σ sᵢ
+    /// aᵢ⊗aᵢ in the material axes, add ½|sᵢ| (aᵢ·Caᵢ − 1) for sᵢ < 0 and ½sᵢ (aᵢ·cof C aᵢ − 1) − sᵢ(J − 1)
+    /// for sᵢ > 0, since 2 ∂(aᵢ·cof C aᵢ)/∂C = 2(1 − aᵢ⊗aᵢ) and 2 ∂J/∂C = 1 at I (after Linden et al. 2023,
     /// <https://doi.org/10.1016/j.jmps.2023.105363>).
     fn rest_of(&self, m: usize, invariants: SymmetryInvariants) -> RestTerm<T> {
         let mut tape = Tape::default();
@@ -236,7 +235,7 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
                 }
             }
         }
-        // what is left: all of it, or rounding
+        // the remainder: all of it, or rounding
         let raw = self.member(m, &identity, &rest, false, &mut tape);
         rest.value = raw.energy;
         rest.slope = raw.first;
@@ -253,7 +252,7 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         &self.members
     }
 
-    /// The same law in another precision.
+    /// Converts the law to another precision.
     ///
     /// # Errors
     /// Weights beyond the range of f32.
@@ -266,7 +265,7 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         Surrogate::new(self.header.clone(), members)
     }
 
-    /// The numbers beside the weights.
+    /// Numbers beside the weights.
     pub fn coefficients(&self) -> Coefficients<'_, T> {
         Coefficients {
             mean: &self.mean,
@@ -284,7 +283,7 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         let mut flags = Flags::default();
         for (a, [low, high]) in self.header.training_box.iter().enumerate() {
             let value = c[a].to_f64();
-            // what never changed may differ by rounding; NaN is outside
+            // components that never changed may differ by rounding; NaN is outside
             let slack = if low == high { UNSEEN } else { 0.0 };
             flags.outside[a] = !(value >= low - slack && value <= high + slack);
             flags.unseen[a] = flags.outside[a] && low == high;
@@ -295,7 +294,7 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         flags
     }
 
-    /// S, the tangent 2 ∂S/∂C and their uncertainty at C, in memory of its own: for single points.
+    /// Computes S, the tangent 2 ∂S/∂C and their uncertainty at C, with new memory: for single points.
     ///
     /// # Errors
     /// Those of [`Surrogate::tangent`].
@@ -303,7 +302,7 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         self.tangent(c, &mut Workspace::default())
     }
 
-    /// S at C with its uncertainty.
+    /// Computes S at C with its uncertainty.
     ///
     /// # Errors
     /// Those of [`Surrogate::tangent`].
@@ -311,7 +310,7 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         memory.with(|memory| self.evaluate(c, false, memory))
     }
 
-    /// S and the tangent 2 ∂S/∂C at C with their uncertainty.
+    /// Computes S and the tangent 2 ∂S/∂C at C with their uncertainty.
     ///
     /// # Errors
     /// [`Error::Invalid`] for a C that is not finite or not positive definite, and for a result that is not
@@ -322,9 +321,9 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
 }
 
 impl Surrogate<f64> {
-    /// The same model, which flags predictions where its members disagree by more than at any of these
-    /// strains, those of its training: as box and distance, a spread is uncertain beyond all that the
-    /// training rows have. No limit for a single member, or for members that agree everywhere.
+    /// Sets the limit of the spread: the model flags predictions whose spread exceeds that at all of these
+    /// strains, those of its training. There is no limit for a single member, or for members that agree
+    /// everywhere.
     ///
     /// # Errors
     /// Those of [`Surrogate::stress`].
@@ -373,7 +372,7 @@ fn product<T: Real>(row: &[T; 6], c: &[T; 6]) -> T {
     sum
 }
 
-/// Tᵀ g and Tᵀ H T: derivatives by c from those by T c.
+/// Tᵀ g and Tᵀ H T: derivatives with respect to c from those with respect to T c.
 fn back<T: Real>(turn: &[[T; 6]; 6], g: &[T; 6], h: &[[T; 6]; 6]) -> ([T; 6], [[T; 6]; 6]) {
     let (mut first, mut half, mut second) = ([T::ZERO; 6], [[T::ZERO; 6]; 6], [[T::ZERO; 6]; 6]);
     for k in 0..6 {

@@ -9,8 +9,9 @@ use nalgebra::{SVector, Vector3};
 /// Step of the central differences: truncation h² ~ 1e-10 and rounding ε/h ~ 2e-11 of the law's own size.
 const STEP: f64 = 1e-5;
 
-/// Deviations of a law from what it must keep, each the largest over some deformations. A deviation of stress
-/// or tangent is relative to the law's size there: the largest component of S and ℂ, and |W|.
+/// Deviations of a law from the properties that every law must have, each the largest over some deformations.
+/// A deviation of stress or tangent is relative to the law's size there: the largest component of S and ℂ,
+/// and |W|.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Deviations {
     /// Deviation of S from 2 ∂W/∂C by central differences; `None` for a law without an energy.
@@ -24,7 +25,7 @@ pub struct Deviations {
     /// Deviation of a stress alone from the stress with its tangent, and of a list from single points: 0, the
     /// same bits.
     pub bits: f64,
-    /// |W(1)| over the size there; none of a law without an energy.
+    /// |W(1)| over the size there; `None` for a law without an energy.
     pub energy_at_rest: Option<f64>,
     /// Deviation of S(1) from zero.
     pub stress_at_rest: f64,
@@ -36,7 +37,7 @@ impl Deviations {
     /// Measures a law at some deformations and at rest.
     ///
     /// # Errors
-    /// What the law refuses at one of them, or a step of 1e-5 beside it.
+    /// Errors of the law at one of them, or a step of 1e-5 beside it.
     pub fn measure(law: &dyn Law, deformations: &[DeformationGradient]) -> Result<Self, Error> {
         let mut memory = Workspace::default();
         let mut all = Self::default();
@@ -132,7 +133,7 @@ pub fn count_ellipticity_losses(
     Ok(lost)
 }
 
-/// Deformations for tests, far from the locking of rubber: at rest, small, sheared, with two and three equal
+/// Deformations for tests, far from the locking of rubber: rest, small strain, shear, two and three equal
 /// stretches, and general ones.
 pub fn deformations() -> Vec<DeformationGradient> {
     let q: Tensor = nalgebra::Rotation3::from_euler_angles(0.3, -1.1, 2.0).into_inner();
@@ -156,7 +157,7 @@ fn size(found: &Prediction) -> f64 {
     found.stress.amax().max(tangent).max(found.energy.unwrap_or(0.0).abs()).max(f64::MIN_POSITIVE)
 }
 
-/// The larger one; NaN stays.
+/// Updates a maximum; keeps NaN.
 fn raise(largest: &mut f64, value: f64) {
     if value.is_nan() || value > *largest {
         *largest = value;
@@ -215,7 +216,7 @@ mod tests {
         }
     }
 
-    /// A law with a slip is found out: a tangent, a stress, a frame.
+    /// Errors in a law are detected: a tangent, a stress, a frame.
     #[test]
     fn slips_are_measured() {
         struct Slip(usize);

@@ -45,8 +45,7 @@ pub struct Cholesky {
 }
 
 impl Cholesky {
-    /// Analyses a pattern, in the order of elimination that its rows are in; `None` where memory does not
-    /// suffice.
+    /// Analyses a pattern, in the order of elimination of its rows; `None` if memory does not suffice.
     pub fn analyse(pattern: Pattern) -> Option<Self> {
         let parameters = CholeskySymbolicParams {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
@@ -64,7 +63,7 @@ impl Cholesky {
         &self.pattern
     }
 
-    /// Computes the factors of the matrix with `entries` in the places of the pattern; false where it is not
+    /// Computes the factors of the matrix with `entries` in the places of the pattern; false if it is not
     /// positive definite to working precision, or memory does not suffice.
     pub fn factor(&self, entries: &[f64], factors: &mut Vec<f64>) -> bool {
         let parameters = Default::default();

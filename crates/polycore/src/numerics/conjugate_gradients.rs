@@ -3,13 +3,13 @@
 use nalgebra::SVector;
 use rayon::prelude::*;
 
-/// Vectors of a work item.
+/// Number of vectors of a work item.
 const ITEM: usize = 4096;
 
-/// Solves A x = r from x = 0 for a symmetric positive definite A; returns x and the number of iterations,
-/// `most` at most. `residual` becomes r − A x; before each iteration `reached` looks at it. `product`
-/// computes A p, `precondition` an approximation of A⁻¹ r, both into their second argument; `dot` adds in an
-/// order of its own.
+/// Solves A x = r from x = 0 for a symmetric positive definite A; returns x and the number of iterations, at
+/// most `most`. `residual` becomes r − A x; `reached` checks it before each iteration. `product` computes A
+/// p, `precondition` an approximation of A⁻¹ r, both into their second argument; `dot` defines the order of
+/// its sum.
 pub fn conjugate_gradients<const D: usize>(
     residual: &mut [SVector<f64, D>],
     most: usize,

@@ -1,6 +1,6 @@
 //! Counting sort (Knuth, The Art of Computer Programming 3, 5.2).
 
-/// Items in numbered groups, in each group in the order in which they came; fewer than 2³² in all.
+/// Items in numbered groups; each group keeps the order of input. Fewer than 2³² items in all.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Groups<T> {
     starts: Vec<u32>,
@@ -38,7 +38,7 @@ impl<T: Copy> Groups<T> {
         self.groups(group, group)
     }
 
-    /// Items of groups that follow each other, from the first to the last.
+    /// Items of consecutive groups, from the first to the last.
     pub fn groups(&self, first: usize, last: usize) -> &[T] {
         &self.items[self.starts[first] as usize..self.starts[last + 1] as usize]
     }

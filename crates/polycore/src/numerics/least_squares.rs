@@ -1,9 +1,9 @@
-//! Least squares of functions that are not linear.
+//! Nonlinear least squares.
 
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::{DMatrix, DVector, Dyn, Owned};
 
-/// A minimum, or where the search ended.
+/// Minimum, or the point where the search ended.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Optimum {
     /// Parameters.

@@ -1,7 +1,7 @@
 //! Disjoint sets (Tarjan 1975, doi:10.1145/321879.321884).
 
-/// Sets of the numbers 0 … n − 1, each at first alone. The least number of a set stands for it, whatever the
-/// order of unions.
+/// Disjoint sets of the numbers 0 … n − 1, each alone at first. The least number of a set represents it, in
+/// any order of unions.
 #[derive(Clone, Debug)]
 pub struct DisjointSets(Vec<u32>);
 
@@ -11,18 +11,18 @@ impl DisjointSets {
         Self((0..count as u32).collect())
     }
 
-    /// The least number in the set of one.
+    /// Representative of the set of a number: its least member.
     pub fn root(&mut self, of: u32) -> u32 {
         let (parent, mut at) = (&mut self.0, of);
         while parent[at as usize] != at {
-            // halves the way for the next one
+            // halves the path for later searches
             parent[at as usize] = parent[parent[at as usize] as usize];
             at = parent[at as usize];
         }
         at
     }
 
-    /// Joins the sets of two numbers; false where they were one.
+    /// Joins the sets of two numbers; returns false if they were one.
     pub fn join(&mut self, a: u32, b: u32) -> bool {
         let (a, b) = (self.root(a), self.root(b));
         self.0[a.max(b) as usize] = a.min(b);

@@ -4,7 +4,7 @@ use super::heading::plain_unit;
 use crate::units::is_unit;
 use std::fmt;
 
-/// Lines that are looked at before the first is read.
+/// Number of lines from which the layout is detected.
 const SAMPLE: usize = 1000;
 
 /// Separator of cells.
@@ -32,9 +32,9 @@ pub enum Decimal {
 /// Layout of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Layout {
-    /// Between cells.
+    /// Separator of cells.
     pub separator: Separator,
-    /// Before decimals.
+    /// Decimal sign.
     pub decimal: Decimal,
     /// Encoding of the file.
     pub encoding: &'static str,
@@ -44,7 +44,7 @@ pub struct Layout {
     pub unit_line: Option<usize>,
 }
 
-/// The cells of the headings and units, and the least number of cells of a row.
+/// Cells of the headings and units, and the least number of cells of a row.
 pub(super) struct Heads {
     pub texts: Vec<String>,
     pub units: Vec<String>,
@@ -65,7 +65,7 @@ impl fmt::Display for Layout {
 }
 
 impl Separator {
-    /// The cells of a line, without the blanks around them.
+    /// Splits a line into cells, without the blanks around them.
     pub(super) fn record(self, line: &str) -> csv::StringRecord {
         match self {
             Self::Blanks => line.split_whitespace().collect(),
@@ -83,7 +83,8 @@ impl Separator {
         }
     }
 
-    /// Headings in which a name is several words, as many as there are cells in a row if that can be.
+    /// Splits a line of headings whose names may be several words, into as many as a row has cells if
+    /// possible.
     fn headings(self, line: &str, width: usize) -> Vec<String> {
         let cells: Vec<String> = self.record(line).iter().map(str::to_owned).collect();
         if self != Self::Blanks || cells.len() == width {
@@ -102,8 +103,8 @@ impl Separator {
         [joined, apart].into_iter().find(|found| found.len() == width).unwrap_or(cells)
     }
 
-    /// Cells that are numbers, less those of several numbers in which another separator stands, twice, or a
-    /// blank.
+    /// Number of cells that are numbers, less twice those of several numbers that contain another separator
+    /// or a blank.
     fn score(self, lines: &[(usize, &str)]) -> i64 {
         let digit = |text: &str, end: bool| {
             let letter = if end { text.chars().next_back() } else { text.chars().next() };
@@ -136,8 +137,8 @@ impl Separator {
 }
 
 impl Decimal {
-    /// The number that a cell is: digits with one decimal sign, separators of thousands only where that is
-    /// certain (both signs occur, in groups of three), an exponent.
+    /// Parses a cell: digits with one decimal sign, separators of thousands only if unambiguous (both signs
+    /// occur, in groups of three), an exponent.
     pub fn number(self, text: &str) -> Option<f64> {
         let start = text.trim_start_matches(['+', '-', '−']);
         if !start.starts_with(|c: char| c.is_ascii_digit() || c == '.' || c == ',') {
@@ -178,13 +179,13 @@ pub(super) fn is_comment(line: &str) -> bool {
     line.starts_with('#') || line.starts_with("//") || percent
 }
 
-/// A remark without its mark.
+/// Removes the mark of a remark.
 fn uncommented(line: &str) -> &str {
     line.trim_start().trim_start_matches(['#', '%', '/']).trim()
 }
 
 impl Layout {
-    /// The layout of a text; a row that stands where headings should, if there are none.
+    /// Detects the layout of a text; returns the row that stands in place of headings if there are none.
     pub(super) fn detect(lines: &[&str]) -> Result<(Self, Heads), (usize, String)> {
         let written = |(_, line): &(usize, &str)| !line.trim().is_empty() && !is_comment(line);
         let numbered = || lines.iter().copied().enumerate();
@@ -210,7 +211,7 @@ impl Layout {
         let pattern = |row: &csv::StringRecord| row.iter().map(is_number).collect::<Vec<bool>>();
         let patterns: Vec<Vec<bool>> = rows.iter().map(pattern).collect();
         let numeric = |i: usize| patterns[i].contains(&true);
-        // rows from here on that look alike
+        // rows from here on with the same pattern
         let run = |from: usize| {
             patterns[from..].iter().take_while(|row| row.contains(&true) && **row == patterns[from]).count()
         };
@@ -258,7 +259,7 @@ impl Layout {
         Ok((layout, Heads::new(texts, units.unwrap_or_default())))
     }
 
-    /// Why a row may have too many cells.
+    /// Hint for a row with too many cells.
     pub(super) fn hint(&self, row: &csv::StringRecord, width: usize) -> &'static str {
         let commas = self.separator == Separator::Sign(',') && row.len() == 2 * width;
         if commas { "; a decimal comma cannot stand beside the separator `,`: export with `;`" } else { "" }
@@ -266,7 +267,7 @@ impl Layout {
 }
 
 impl Heads {
-    /// Columns without a name at the end need not be in every row.
+    /// Creates the headings; columns without a name at the end need not be in every row.
     fn new(texts: Vec<String>, units: Vec<String>) -> Self {
         let least = texts.iter().rposition(|text| !text.is_empty()).map_or(0, |last| last + 1);
         Self { texts, units, least }
@@ -281,8 +282,8 @@ fn is_units(row: &csv::StringRecord) -> bool {
     real && row.iter().all(unit)
 }
 
-/// Units below headings; between blanks, where some have none, each belongs to the heading that ends next to
-/// it.
+/// Assigns units to the headings above them; if some headings have none, each unit belongs to the heading
+/// that ends next to it.
 fn aligned(separator: Separator, names: &str, units: &str, width: usize) -> Vec<String> {
     let cells: Vec<String> = separator.record(units).iter().map(str::to_owned).collect();
     if separator != Separator::Blanks || cells.len() == width {
@@ -304,8 +305,8 @@ fn aligned(separator: Separator, names: &str, units: &str, width: usize) -> Vec<
     found
 }
 
-/// Headings in the last remark above a row that has as many cells (`##Temp./°C;Time/min`, `# strain stress`),
-/// and its line.
+/// Finds headings in the last remark above a row that has as many cells (`##Temp./°C;Time/min`,
+/// `# strain stress`), and its line.
 fn headed_by_remark(
     separator: Separator,
     lines: &[&str],

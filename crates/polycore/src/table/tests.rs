@@ -15,8 +15,8 @@ fn refused(text: &str) -> String {
     values.and(other).expect_err(text).to_string()
 }
 
-/// Strain (as a fraction) and stress (Pa) of files in the ways of testing machines and of people: the numbers
-/// are the same.
+/// Strain (as a fraction) and stress (Pa) in files of testing machines and of people: the numbers are the
+/// same.
 #[test]
 fn ways_to_write_a_table() {
     for (text, how) in [
@@ -163,7 +163,7 @@ fn refusals_say_how_the_table_was_understood() {
     }
 }
 
-/// 50,000 rows: time grows as their number, not with the square.
+/// 50,000 rows: time grows with their number, not with the square.
 #[test]
 fn many_rows() {
     let mut text = String::from("time [s];value;note\n");

@@ -1,4 +1,4 @@
-//! The deformation gradient and what follows from it.
+//! The deformation gradient and quantities derived from it.
 
 use super::decomposition::{adjugate, determinant, principal_frame};
 use super::{Error, PrincipalFrame, Tensor, Tensor2, Voigt};
@@ -59,7 +59,7 @@ impl DeformationGradient {
         Self::new(Tensor::from_diagonal(&stretches.into()))
     }
 
-    /// The upper triangular F with FᵀF = C (3.2), Cholesky's: one of the F of this C, which differ by a
+    /// Upper triangular F with FᵀF = C (3.2), by Cholesky: one of the F of this C, which differ by a
     /// rotation.
     ///
     /// # Errors
@@ -86,8 +86,8 @@ impl DeformationGradient {
         Self::new(embed(in_plane, 1.0))
     }
 
-    /// Plane stress with a thickness stretch λ₃ that is known;
-    /// [`crate::constitutive::hyperelastic::plane_stress`] finds the one that makes S₃₃ vanish.
+    /// Plane stress with a known thickness stretch λ₃; [`crate::constitutive::hyperelastic::plane_stress`]
+    /// finds the one that makes S₃₃ vanish.
     ///
     /// # Errors
     /// As [`DeformationGradient::new`]; [`Error::Stretch`] for λ₃.

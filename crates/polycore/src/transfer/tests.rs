@@ -57,7 +57,7 @@ fn cells_to_particles() {
     );
 }
 
-/// A box beside a cell that it touches but for rounding has no part of it.
+/// A box that touches a cell, up to rounding, has no intersection with it.
 #[test]
 fn boxes_that_touch() {
     let (points, cells) = brick([3, 1, 1], |[x, y, z]| [1e-4 * (0.1 + 0.2) * x, 1e-3 * y, 1e-3 * z]);
@@ -90,7 +90,7 @@ fn nodes_to_particles() {
         let middle = std::array::from_fn(|d| 0.5 * (b.min[d] + b.max[d]));
         assert!((mean - linear(middle)).abs() < 1e-14, "{mean}");
     }
-    // the lumped projection keeps what the boxes have
+    // the lumped projection conserves the integral over the boxes
     let back: Vec<f64> = overlap.to_nodes(&means).unwrap().into_iter().flatten().collect();
     let sum: f64 = means.iter().zip(&boxes).map(|(mean, b)| mean * b.volume()).sum();
     let [_, kept] = integral(&points, &cells, &back).unwrap();

@@ -1,8 +1,8 @@
-//! Why a text is not a quantity.
+//! Errors of reading quantities.
 
 use super::{Dimension, Exponents, name_of};
 
-/// A text that is not the quantity a scene asks for.
+/// Error of a text that is not the required quantity.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum UnitError {
     /// Empty text.

@@ -9,11 +9,11 @@
 
 use super::{Exponents, UnitError, table};
 
-/// No physical unit needs more; keeps exponents far from overflow.
+/// Largest power of a unit; keeps exponents far from overflow.
 const LARGEST_POWER: i32 = 12;
-/// Brackets inside brackets.
+/// Deepest nesting of brackets.
 const DEEPEST: usize = 8;
-/// A unit is a few symbols; longer texts are not units.
+/// Longest text of a unit, characters.
 const LONGEST: usize = 200;
 
 /// Splits `2e-3 N/mm^2` into the number and the trimmed rest.
@@ -182,7 +182,7 @@ impl UnitParser<'_> {
             ascii = self.rest[..end].chars().map(translate).collect();
             self.rest = &self.rest[end..];
             if ascii.is_empty() {
-                // `mm2`: the digit sticks to the symbol
+                // `mm2`: the digit follows the symbol directly
                 if let Some(digit) = self.rest.chars().next().filter(char::is_ascii_digit) {
                     return Err(self.problem(format!("write powers with `^`, as in `^{digit}`")));
                 }

@@ -1,4 +1,4 @@
-//! The table of unit symbols: `uom`'s, restricted to single words.
+//! Table of unit symbols: those of `uom` that are single words.
 
 use std::collections::HashMap;
 use std::sync::LazyLock;
@@ -7,7 +7,7 @@ use super::{Exponents, exponents};
 
 type UnitTable = HashMap<&'static str, ([f64; 2], Exponents)>;
 
-/// Longer symbols are historical curiosities (`libra`, `congius`) that would only spoil the suggestions.
+/// Longest symbol; longer ones are historical (`libra`, `congius`) and would only spoil the suggestions.
 const LONGEST_SYMBOL: usize = 4;
 
 static TABLE: LazyLock<UnitTable> = LazyLock::new(|| {
@@ -21,7 +21,7 @@ static TABLE: LazyLock<UnitTable> = LazyLock::new(|| {
                 if !word || symbol.chars().count() > LONGEST_SYMBOL || affine(symbol).is_some() {
                     continue;
                 }
-                // uom gives factors only through its types; its parser is the enumerable way to them
+                // uom gives factors only through its types; its parser makes them enumerable
                 if let Ok(one) = format!("1 {symbol}").parse::<uom::si::f64::$type>() {
                     table.entry(symbol).or_insert((fraction(one.value), $exponents));
                 }
@@ -58,7 +58,7 @@ static TABLE: LazyLock<UnitTable> = LazyLock::new(|| {
             table.entry(alias).or_insert(entry);
         }
     }
-    // ab initio programs tell pressures in it
+    // ab initio programs print pressures in kbar
     if let Some(&([bar, one], exponents)) = table.get("bar") {
         table.entry("kbar").or_insert(([1000.0 * bar, one], exponents));
     }

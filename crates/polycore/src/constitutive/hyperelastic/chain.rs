@@ -26,8 +26,8 @@ pub struct EightChain {
     links: f64,
 }
 
-/// The eight-chain law plus c(√I₂ − √3): the term that general biaxial data ask for (formulation.md, "Beyond
-/// the thesis"; the term is that of Carroll, J. Elasticity 103 (2011) 173–187).
+/// Eight-chain law plus c(√I₂ − √3), a term that general biaxial data require (formulation.md, "Beyond the
+/// thesis"; Carroll, J. Elasticity 103 (2011) 173–187).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EightChainRootI2 {
     network: EightChain,
@@ -80,7 +80,7 @@ pub(super) const EIGHT_CHAIN_ROOT_I2: ModelDescriptor = ModelDescriptor {
     refine: None,
 };
 
-/// Chains so long that they never lock.
+/// Number of links from which on chains never lock in practice.
 const UNLOCKED: Contained =
     Contained { key: "neo-hookean", embed: |p, start| vec![vec![p[0], UNLIMITED * start.limits[1]]] };
 
@@ -88,12 +88,12 @@ fn starts(start: &FitStart<'_>) -> Vec<Vec<f64>> {
     [1.02, 1.3, 3.0].map(|r| vec![0.8 * start.modulus, r * start.limits[1]]).to_vec()
 }
 
-/// n must exceed λ² of the longest chain.
+/// Lower limit of n: λ² of the longest chain.
 fn largest_square(stretches: [f64; 3]) -> f64 {
     stretches.iter().fold(1.0, |most, l| (l * l).max(most))
 }
 
-/// n must exceed I₁/3.
+/// Lower limit of n: I₁/3.
 fn chain_square(stretches: [f64; 3]) -> f64 {
     (Invariants::from_stretches(stretches).first / 3.0).max(1.0)
 }
@@ -179,7 +179,7 @@ impl EightChain {
         Ok(Self { modulus, links })
     }
 
-    /// The law with the given small-strain shear modulus μ₀ = Nkθ √n 𝓛⁻¹(1/√n)/3.
+    /// Builds the law with the small-strain shear modulus μ₀ = Nkθ √n 𝓛⁻¹(1/√n)/3.
     ///
     /// # Errors
     /// [`Error::Parameter`].
@@ -294,9 +294,9 @@ struct Extension {
 }
 
 impl Extension {
-    /// A chain whose λ² is the mean square of the given stretches, or `None` at and beyond locking. Near
-    /// locking the complement 1 − x = (1 − λ²/n)/(1 + x) carries what x itself cannot; n − λ² is summed in
-    /// doubled precision.
+    /// Computes the state of a chain whose λ² is the mean square of the given stretches; `None` at and beyond
+    /// locking. Near locking the complement 1 − x = (1 − λ²/n)/(1 + x) carries the digits that x loses; n −
+    /// λ² is summed in doubled precision.
     fn new(stretches: &[f64], links: f64) -> Option<Self> {
         let count = stretches.len() as f64;
         let full = count * links;
@@ -345,7 +345,7 @@ impl Extension {
         langevin::free_energy(self.beta)
     }
 
-    /// f(x) − f(x₀), with I₁ − 3 given exactly: near rest, where f is flat on the scale of its rounding, by
+    /// f(x) − f(x₀), from I₁ − 3 given exactly. Near rest, where f is flat compared with its rounding, it is
     /// the integral of β/(2nx·3) over I₁.
     fn energy_above(&self, rest: &Self, excess: f64) -> f64 {
         // x² − x₀² = (I₁ − 3)/3n and x₀² = 1/n

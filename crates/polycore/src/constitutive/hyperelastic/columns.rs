@@ -35,27 +35,27 @@ pub(super) struct Role {
     pub what: ColumnKind,
     /// Index of the axis: 0 for `stretch_1`, 1 for `stretch_2`.
     pub axis: Option<usize>,
-    /// The axis is a number, which may also be that of a specimen.
+    /// True if the axis is a number, which may also number a specimen.
     pub numbered: bool,
-    /// Counted positive in compression.
+    /// True if stresses are positive in compression.
     pub compressive: bool,
-    /// Unit; nothing where the heading has none.
+    /// Unit; `None` if the heading has none.
     pub unit: Option<String>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum ColumnKind {
-    /// A strain, of which the heading may name the measure.
+    /// Strain; the heading may name the measure.
     Strain(Option<StrainMeasure>),
-    /// A stress, of which the heading may name the measure.
+    /// Stress; the heading may name the measure.
     Stress(Option<TestStressMeasure>),
-    /// The name of a test.
+    /// Name of a test.
     Mode,
-    /// A force or a displacement.
+    /// Force or displacement.
     Raw,
 }
 
-/// Words that make a column something derived from a strain or stress.
+/// Words that mark a quantity derived from a strain or stress.
 const OTHERS: [&str; 14] = [
     "rate",
     "modulus",
@@ -80,7 +80,7 @@ const FORCES: [&str; 5] = ["force", "load", "kraft", "standardkraft", "prüfkraf
 const TRUE: [&str; 6] = ["true", "cauchy", "log", "logarithmic", "hencky", "wahre"];
 const NOMINAL: [&str; 8] = ["engineering", "eng", "nominal", "technical", "pk1", "p", "piola", "technische"];
 
-/// Headings of the names of tests; of all but the first only if the cells are such names.
+/// Headings of columns with names of tests; all but the first count only if the cells are such names.
 pub(super) const MODES: [&str; 9] = [
     "mode",
     "test",
@@ -141,7 +141,7 @@ impl Role {
     }
 }
 
-/// The plain name and the unit, which may stand behind a `_`: `nominal_1_N/mm^2`.
+/// Splits the heading into its plain name and the unit, which may follow a `_`: `nominal_1_N/mm^2`.
 fn suffixed(heading: &Heading) -> (String, Option<String>) {
     for (at, _) in heading.text.match_indices('_') {
         let (name, unit) = (&heading.text[..at], &heading.text[at + 1..]);
@@ -153,7 +153,7 @@ fn suffixed(heading: &Heading) -> (String, Option<String>) {
     (heading.plain.clone(), heading.unit.clone())
 }
 
-/// The test that a cell names, and whether it is compression.
+/// Reads the name of a test from a cell; true if it is compression.
 pub(super) fn mode(cell: &str) -> Option<(Mode, bool)> {
     let plain = plainly(cell);
     let words: Vec<&str> = plain.split(' ').collect();

@@ -18,14 +18,14 @@ pub struct Compressible<L> {
 /// Factor g before ln J.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Coupling {
-    /// The one that makes F = 1 stress free.
+    /// Value that makes F = 1 stress free.
     #[default]
     StressFree,
-    /// The one that the thesis prints in (1.19), (1.21), (1.23).
+    /// Value printed in (1.19), (1.21), (1.23).
     AsPublished,
 }
 
-/// The volumetric energy U(J).
+/// Volumetric energy U(J).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Volumetric {
     /// U = ½λ(J − 1)². Finite as J → 0: it does not resist collapse by itself, −g ln J does.
@@ -57,7 +57,7 @@ pub enum Volumetric {
 impl<L: Hyperelastic> Compressible<L> {
     const NAME: &'static str = "compressible form";
 
-    /// The stress-free form of a law with a volumetric term.
+    /// Builds the stress-free form of a law with a volumetric term.
     ///
     /// # Errors
     /// [`Error::Parameter`] for λ < 0 or a pressure that is not finite.

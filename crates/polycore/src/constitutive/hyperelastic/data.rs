@@ -3,7 +3,7 @@
 use super::Error;
 use super::homogeneous::incompressible;
 
-/// A table of homogeneous states.
+/// Table of homogeneous states.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TestData {
     /// Source of the numbers: the `# source:` line of the file, or empty.
@@ -12,24 +12,24 @@ pub struct TestData {
     pub states: Vec<TestState>,
 }
 
-/// The test that a state is of.
+/// Type of test.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize)]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Mode {
-    /// A bar: λ₂ = λ₃ = λ₁^{−1/2}.
+    /// Bar: λ₂ = λ₃ = λ₁^{−1/2}.
     Uniaxial,
-    /// A sheet, alike in both directions: λ₂ = λ₁.
+    /// Sheet stretched equally in both directions: λ₂ = λ₁.
     Equibiaxial,
-    /// A wide strip ("planar tension"): λ₂ = 1.
+    /// Wide strip ("planar tension"): λ₂ = 1.
     PureShear,
-    /// Any λ₁, λ₂; of tables, no test of its own.
+    /// General biaxial state, any λ₁, λ₂; a table, not a test with one stretch.
     #[serde(skip)]
     Biaxial,
 }
 
 impl Mode {
-    /// The tests that one stretch describes.
+    /// Tests that one stretch describes.
     pub const TESTS: [Self; 3] = [Self::Uniaxial, Self::Equibiaxial, Self::PureShear];
 
     /// Name of the test in tables and scenes.
@@ -42,7 +42,7 @@ impl Mode {
         }
     }
 
-    /// λ₂ of a test at λ₁; of [`Mode::Biaxial`], which has none, λ₁ too.
+    /// λ₂ of a test at λ₁; for [`Mode::Biaxial`], which defines none, λ₁.
     pub fn second_stretch(self, first: f64) -> f64 {
         match self {
             Self::Uniaxial => first.recip().sqrt(),
@@ -64,10 +64,10 @@ pub struct TestState {
 }
 
 impl TestData {
-    /// The states of one test.
+    /// Selects the states of one test.
     ///
     /// # Errors
-    /// [`Error::Data`] where no stress of it was measured.
+    /// [`Error::Data`] if no stress of it was measured.
     pub fn select(&self, mode: Mode) -> Result<Self, Error> {
         let states = self.states.iter().copied().filter(|state| state.mode == mode).collect();
         let table = Self { source: self.source.clone(), states };

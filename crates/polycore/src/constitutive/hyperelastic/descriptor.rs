@@ -5,7 +5,7 @@ use super::{Error, Hyperelastic};
 
 type Build = fn(&[f64]) -> Result<Box<dyn Hyperelastic>, Error>;
 
-/// A law as a function of its parameters. To add one: a file, and its name in [`super::MODELS`].
+/// Law as a function of its parameters. To add one: a file, and its name in [`super::MODELS`].
 #[derive(Debug, Clone, Copy)]
 pub struct ModelDescriptor {
     /// The name in scenes and reports.
@@ -14,26 +14,24 @@ pub struct ModelDescriptor {
     pub kind: ModelKind,
     /// Names, units and domains of the parameters.
     pub parameters: &'static [Parameter],
-    /// The law with the given parameters, as many as [`ModelDescriptor::parameters`]; see
-    /// [`ModelDescriptor::law`].
+    /// Constructor from as many parameters as [`ModelDescriptor::parameters`]; see [`ModelDescriptor::law`].
     pub(super) build: Build,
     /// Plausible values for a rubber.
     pub example: &'static [f64],
     /// Starting points of fits.
     pub(super) starts: fn(&FitStart<'_>) -> Vec<Vec<f64>>,
-    /// Laws that this one becomes at some parameters: it fits no worse than they do.
+    /// Laws that this one contains at some parameters: it fits no worse than they do.
     pub(super) contains: &'static [Contained],
-    /// Nominal stresses and their derivatives with respect to the parameters, where they are known in closed
-    /// form.
+    /// Nominal stresses and their derivatives with respect to the parameters, if known in closed form.
     pub(super) slopes: Option<Slopes>,
-    /// Moves parameters along valleys in which the optimiser of all of them is slow.
+    /// Moves parameters along valleys in which the optimiser of all parameters is slow.
     pub(super) refine: Option<Refine>,
 }
 
 /// Maps parameters to better ones.
 pub(super) type Refine = fn(&[f64], &FitStart<'_>) -> Vec<f64>;
 
-/// A law inside another one.
+/// Law contained in another one.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Contained {
     /// Key of the inner law.
@@ -46,13 +44,13 @@ pub(super) struct Contained {
 /// Computes P₁, P₂ and their derivatives with respect to each parameter, from the parameters and λ₁, λ₂.
 pub(super) type Slopes = fn(&[f64], [f64; 2], &mut [[f64; 2]]) -> [f64; 2];
 
-/// Share of a modulus at which a term is absent.
+/// Share of the modulus below which a term is absent.
 pub(super) const ABSENT: f64 = 1e-17;
 
-/// Part by which a locking limit exceeds the least one where it is beyond what data can tell from infinity.
+/// Excess of a locking limit over its least value, relative, beyond which data cannot tell it from infinity.
 pub(super) const UNLIMITED: f64 = 1e6;
 
-/// The thesis' two categories of laws (§1.1).
+/// Category of a law in the thesis (§1.1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ModelKind {
     /// Written in invariants or stretches, chosen to fit data.
@@ -91,12 +89,12 @@ pub enum Domain {
     Real,
     /// (0, ∞).
     Positive,
-    /// Above the largest value of this function of the stretches in the data: a locking limit.
+    /// Locking limit: above the largest value of this function of the stretches in the data.
     Above(fn([f64; 3]) -> f64),
 }
 
 impl ModelDescriptor {
-    /// The law with these parameters (SI, in the order of [`ModelDescriptor::parameters`]).
+    /// Builds the law with these parameters (SI, in the order of [`ModelDescriptor::parameters`]).
     ///
     /// # Errors
     /// [`Error::Parameter`]; [`Error::Data`] for a wrong number of parameters.

@@ -1,9 +1,10 @@
 //! Least-squares fit of a law to homogeneous states.
 //!
-//! Minimised is the sum of squares of the nominal-stress residuals, over every stress of the table that was
-//! measured (is not exactly zero; [`super::data::TestState::nominal`]). The figure of merit, `rms`, is the
-//! root of its mean. Levenberg–Marquardt in transformed parameters (ln p for positive ones, ln(p/limit − 1)
-//! for locking limits) keeps every iterate in the law's domain; several starts guard against local minima.
+//! The objective is the sum of squares of the nominal-stress residuals, over every measured stress of the
+//! table (those that are not exactly zero; [`super::data::TestState::nominal`]). The figure of merit, `rms`,
+//! is the root of its mean. Levenberg–Marquardt in transformed parameters (ln p for positive ones, ln(p/limit
+//! − 1) for locking limits) keeps every iterate in the law's domain; several starting points guard against
+//! local minima.
 
 use std::cell::Cell;
 
@@ -27,13 +28,13 @@ pub struct Fit {
     /// Root mean square of the residuals over the measured stresses, Pa.
     pub rms: f64,
     /// Draws of all parameters from their posterior ([`crate::posterior`]); those that the data do not
-    /// determine stay at their values. Empty where the data determine none.
+    /// determine keep their values. Empty if the data determine none.
     pub draws: Vec<Vec<f64>>,
-    /// Measured stresses.
+    /// Number of measured stresses.
     pub measurements: usize,
-    /// Evaluations of all residuals, over all starts (without those for derivatives).
+    /// Number of evaluations of all residuals, over all starts (without those for derivatives).
     pub iterations: usize,
-    /// Starts tried, and how many of them ended within 1e-4 of the best rms.
+    /// Number of starts, and of those that ended within 1e-4 of the best rms.
     pub starts: (usize, usize),
 }
 
@@ -70,7 +71,8 @@ pub struct Agreement {
     pub rms: f64,
     /// Mean of their absolute values, Pa.
     pub mae: f64,
-    /// 1 − Σr²/Σ(P − P̄)² with P̄ the mean of the measured stresses; none where they are all the same.
+    /// Coefficient of determination 1 − Σr²/Σ(P − P̄)², P̄ the mean of the measured stresses; `None` if they
+    /// are all equal.
     pub r2: Option<f64>,
 }
 
@@ -94,11 +96,11 @@ impl Agreement {
     }
 }
 
-/// The best fit of a model to a table: never worse than that of a law that it contains.
+/// Finds the best fit of a model to a table: never worse than that of a law that it contains.
 ///
 /// # Errors
 /// [`Error::Data`] if the table has fewer measurements than the law has parameters, or a mean stiffness below
-/// zero; [`Error::NoConvergence`] if no start arrives anywhere.
+/// mean stiffness below zero; [`Error::NoConvergence`] if no start converges.
 pub fn fit(model: &'static ModelDescriptor, table: &TestData) -> Result<Fit, Error> {
     fit_until(model, table, &|| false)
 }
@@ -205,11 +207,11 @@ pub fn fit_until(
     Ok(Fit { law, model, parameters, rms, draws: found.draws, measurements, iterations, starts })
 }
 
-/// The modulus of the best neo-Hookean law, in closed form: P is linear in μ. Scale and start of every fit.
-/// Pa.
+/// Modulus of the best neo-Hookean law, Pa, in closed form: P is linear in μ. It is the scale and the
+/// starting point of every fit.
 ///
 /// # Errors
-/// [`Error::Data`] where it is not above zero.
+/// [`Error::Data`] if it is not above zero.
 pub fn neo_hookean_modulus(table: &TestData) -> Result<f64, Error> {
     let unit = super::NeoHookean::new(1.0)?;
     let (mut model_data, mut model_model) = (0.0, 0.0);

@@ -1,4 +1,4 @@
-//! Fits in parameters without bounds: the optimiser's problem, and what the data say at its end.
+//! Unconstrained parameters of fits: the optimiser's problem, and the uncertainty at its minimum.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -11,16 +11,16 @@ use super::{Domain, Error, Hyperelastic, ModelDescriptor, homogeneous};
 pub enum Identifiability {
     /// Determined by the data.
     Determined,
-    /// A modulus without any effect on the stresses, or the exponent of such a term: the term is absent.
+    /// Modulus without effect on the stresses, or the exponent of such a term: the term is absent.
     Absent,
     /// Not bounded from above by the data, e.g. a locking limit far beyond them.
     Undetermined,
 }
 
-/// Model minus data for every measured stress, Pa, state by state.
+/// Computes model minus data for every measured stress, Pa, state by state.
 ///
 /// # Errors
-/// What the law refuses at a state of the table.
+/// Errors of the law at a state of the table.
 pub fn residuals<L: Hyperelastic + ?Sized>(law: &L, table: &TestData) -> Result<Vec<f64>, Error> {
     let mut residuals = Vec::with_capacity(2 * table.states.len());
     for state in &table.states {
@@ -31,7 +31,7 @@ pub fn residuals<L: Hyperelastic + ?Sized>(law: &L, table: &TestData) -> Result<
     Ok(residuals)
 }
 
-/// The differences carry 1e-10, and an effect below 1e-6 of the stresses tells nothing.
+/// Least effect on the stresses that counts: the differences carry 1e-10.
 const EFFECT: f64 = 1e-6;
 
 /// Uncertainty of the parameters at a minimum.
@@ -55,7 +55,7 @@ fn measured<'a>(
     })
 }
 
-/// Between the parameters p of a law and the unbounded q of the optimiser.
+/// Map between the parameters p of a law and the unbounded q of the optimiser.
 pub(super) struct ParameterMap<'a> {
     model: &'a ModelDescriptor,
     /// Lower limit of each p.
@@ -63,7 +63,7 @@ pub(super) struct ParameterMap<'a> {
     modulus: f64,
 }
 
-/// |q| beyond which a parameter is at its limit or at infinity for all purposes; e^±40 = 4e∓18.
+/// Bound of |q|, beyond which a parameter is practically at its limit or at infinity; e^±40 = 4e∓18.
 const FARTHEST: f64 = 40.0;
 
 impl<'a> ParameterMap<'a> {
@@ -209,7 +209,7 @@ impl<'a> ParameterMap<'a> {
         found
     }
 
-    /// The q that the residuals determine, their covariance s²(JᵀJ)⁻¹ and the degrees of freedom.
+    /// Returns the q that the residuals determine, their covariance s²(JᵀJ)⁻¹ and the degrees of freedom.
     fn covariance(&self, q: &DVector<f64>, table: &TestData) -> Option<(Vec<usize>, DMatrix<f64>, usize)> {
         let (residuals, jacobian) = (self.residuals(q, table)?, self.jacobian(q, table)?);
         let norms: Vec<f64> = jacobian.column_iter().map(|column| column.norm()).collect();
@@ -233,5 +233,5 @@ impl<'a> ParameterMap<'a> {
     }
 }
 
-/// A residual in units of the modulus that no step is accepted with.
+/// Residual in units of the modulus with which no step is accepted.
 pub(super) const REJECTED: f64 = 1e100;

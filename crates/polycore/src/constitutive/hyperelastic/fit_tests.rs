@@ -191,7 +191,7 @@ fn three_terms_on_a_bar() {
     assert!(found < 0.0483, "{found}");
 }
 
-/// Terms without an effect are said to be absent, locking limits beyond the data undetermined.
+/// Terms without effect are reported as absent, locking limits beyond the data as undetermined.
 #[test]
 fn what_data_do_not_determine() {
     let text: String = [1.2, 1.4, 1.6, 1.8, 2.0, 2.2, 2.4]

@@ -90,7 +90,7 @@ pub(super) const OGDEN_3: ModelDescriptor = ModelDescriptor {
 impl Ogden {
     const NAME: &'static str = "Ogden";
 
-    /// Pairs (μᵢ in Pa, αᵢ ≠ 0); the shear modulus that they add up to must be positive.
+    /// Builds the law from pairs (μᵢ in Pa, αᵢ ≠ 0); the shear modulus, their sum, must be positive.
     ///
     /// # Errors
     /// [`Error::Parameter`], also for an empty list.
@@ -111,7 +111,7 @@ impl Ogden {
         Ok(law)
     }
 
-    /// The same law with its μᵢ in another convention.
+    /// Returns the same law with its μᵢ in another convention.
     pub fn in_convention(&self, convention: OgdenConvention) -> Self {
         let terms = self
             .terms

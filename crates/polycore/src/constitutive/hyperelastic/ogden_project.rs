@@ -9,7 +9,7 @@ use super::descriptor::{ABSENT, FitStart};
 use super::ogden_starts::slopes;
 use crate::numerics::least_squares::levenberg_marquardt;
 
-/// A start, moved to where the exponents are best; itself where the search fails.
+/// Moves a start to the best exponents; returns it unchanged if the search fails.
 pub(super) fn projected(p: &[f64], start: &FitStart<'_>) -> Vec<f64> {
     let data = start.table.states.iter().flat_map(|state| state.nominal).filter(|data| *data != 0.0);
     let data = DVector::from_iterator(start.table.measurements(), data) / start.modulus;
@@ -33,10 +33,10 @@ struct Projected<'a> {
     data: DVector<f64>,
 }
 
-/// The best moduli, in units of the modulus; 0 of terms that would only be of use below.
+/// Best moduli, in units of the modulus; 0 for terms that only a negative modulus would improve.
 struct OgdenModuli {
     moduli: DVector<f64>,
-    /// An orthonormal basis of the stresses of the terms that are present.
+    /// Orthonormal basis of the stresses of the terms that are present.
     basis: DMatrix<f64>,
     residuals: DVector<f64>,
 }

@@ -6,13 +6,13 @@ use nalgebra::{DMatrix, DVector};
 
 use super::descriptor::{ABSENT, FitStart};
 
-/// |α| of the grid; both signs are tried.
+/// Grid of |α|; both signs are tried.
 const EXPONENTS: [f64; 14] = [0.3, 0.6, 1.0, 1.5, 2.0, 2.7, 3.6, 4.8, 6.5, 9.0, 12.0, 17.0, 24.0, 34.0];
 
-/// Starts that are handed to the optimiser.
+/// Number of starts handed to the optimiser.
 const KEPT: usize = 8;
 
-/// Starts from the optimum of a law of one term less.
+/// Number of starts from the optimum of the law with one term less.
 const GROWN: usize = 3;
 
 /// Parameter sets [μ₁, α₁, …] in Abaqus' convention, best first, no two of them neighbours on the grid.
@@ -60,8 +60,8 @@ pub(super) fn starts<const TERMS: usize>(start: &FitStart<'_>) -> Vec<Vec<f64>> 
     parameters.collect()
 }
 
-/// A law of one term less as a start, its new term absent; and with a new term of an exponent of the grid
-/// that lowers the misfit, the best three.
+/// Starts from a law with one term less: its new term absent, and the best three with a new term whose
+/// exponent of the grid lowers the misfit.
 pub(super) fn grown(smaller: &[f64], start: &FitStart<'_>) -> Vec<Vec<f64>> {
     let total: f64 = smaller.chunks_exact(2).map(|term| term[0]).sum();
     let mut all = vec![[smaller, &[ABSENT * total, 1.0]].concat()];
@@ -97,7 +97,7 @@ pub(super) fn grown(smaller: &[f64], start: &FitStart<'_>) -> Vec<Vec<f64>> {
     all
 }
 
-/// The stresses of one term of unit modulus, where they are finite.
+/// Stresses of one term of unit modulus, if they are finite.
 fn column(start: &FitStart<'_>, exponent: f64) -> Option<DVector<f64>> {
     let mut values = Vec::with_capacity(start.table.measurements());
     for state in &start.table.states {
@@ -108,8 +108,8 @@ fn column(start: &FitStart<'_>, exponent: f64) -> Option<DVector<f64>> {
     Some(DVector::from_vec(values)).filter(|column| column.norm().is_finite() && column.norm() > 0.0)
 }
 
-/// The exponents whose stresses are finite in the data, those stresses of unit moduli, and the data in units
-/// of the modulus.
+/// Exponents whose stresses are finite in the data, those stresses of unit moduli, and the data in units of
+/// the modulus.
 fn columns(start: &FitStart<'_>) -> (Vec<f64>, Vec<DVector<f64>>, DVector<f64>) {
     let grid = EXPONENTS.iter().rev().map(|a| -a).chain(EXPONENTS);
     let (exponents, columns) =
@@ -119,7 +119,7 @@ fn columns(start: &FitStart<'_>) -> (Vec<f64>, Vec<DVector<f64>>, DVector<f64>) 
     (exponents, columns, data)
 }
 
-/// The next ascending choice out of `count`; false after the last.
+/// Advances to the next ascending choice out of `count`; returns false after the last.
 fn next_subset(chosen: &mut [usize], count: usize) -> bool {
     let terms = chosen.len();
     for i in (0..terms).rev() {

@@ -3,32 +3,33 @@
 use super::columns::StrainMeasure;
 use super::data::Mode;
 
-/// A row of a table of one stress or two.
+/// Row of a table with one stress or two.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TestRow {
     pub index: usize,
     pub mode: Mode,
     /// True for a test labelled as compression.
     pub compression: bool,
-    /// Strains as they are written, without their unit.
+    /// Strains as written, without their unit.
     pub written: [f64; 2],
     pub stretches: [f64; 2],
     pub nominal: [f64; 2],
 }
 
-/// Stresses below this share of the largest are noise around zero.
+/// Share of the largest stress below which stresses are noise around zero.
 const NOISE: f64 = 0.02;
-/// Strain without a unit beyond which it must be in per cent: rubbers break before.
+/// Strain without a unit beyond which it must be in per cent: rubbers break earlier.
 const LARGEST_STRAIN: f64 = 20.0;
-/// Part of the largest stress to which a torn specimen falls at least.
+/// Share of the largest stress to which the stress of a torn specimen falls.
 const TORN: f64 = 0.7;
-/// Part of the strain at the largest stress that it still has then; one that is unloaded has less.
+/// Share of the strain at the largest stress below which a specimen is unloaded, not torn.
 const HELD: f64 = 0.95;
 
-/// Turns compressive stresses that are counted positive, and leaves out what follows the break of a specimen.
+/// Changes the sign of compressive stresses that are positive, and removes rows after the break of a
+/// specimen.
 ///
 /// # Errors
-/// A row, and what would be allowed there: strains that are stretches or in per cent, stretches that are
+/// A row, and the content allowed there: strains that are stretches or in per cent, stretches that are
 /// strains, stresses against the strain.
 pub(super) fn plausible(
     rows: &mut Vec<TestRow>,
@@ -102,8 +103,8 @@ fn slope(rows: &[TestRow]) -> f64 {
     rows.iter().map(|row| (row.stretches[0] - x) * (row.nominal[0] - y)).sum()
 }
 
-/// Leaves out rows after the largest stress of each specimen in tension where the stress falls and the
-/// specimen is not unloaded.
+/// Removes rows after the largest stress of each specimen in tension, if the stress falls and the specimen is
+/// not unloaded.
 fn leave_out_tails(rows: &mut Vec<TestRow>, notes: &mut Vec<String>, mode: Mode) {
     let places: Vec<usize> = (0..rows.len()).filter(|&i| rows[i].mode == mode).collect();
     let strain = |i: usize| rows[i].stretches[0] - 1.0;

@@ -90,7 +90,7 @@ impl Hyperelastic for NeoHookean {
 impl MooneyRivlin {
     const NAME: &'static str = "Mooney-Rivlin";
 
-    /// C₁, C₂ in Pa, either of them may be negative, but C₁ + C₂ > 0.
+    /// Builds the law from C₁, C₂ in Pa; either may be negative, but C₁ + C₂ > 0.
     ///
     /// # Errors
     /// [`Error::Parameter`].

@@ -3,7 +3,7 @@
 use super::data::{Mode, TestData};
 use super::{Hyperelastic, homogeneous};
 
-/// Steps of a scan from rest to the end of a range.
+/// Number of steps of a scan from rest to the end of a range.
 const STEPS: usize = 200;
 /// Step of the differences in ln λ; their error is its square.
 const STEP: f64 = 1e-5;

@@ -1,4 +1,4 @@
-//! Tables of measured states, as files have them.
+//! Readers of test data in tables.
 
 use std::path::Path;
 
@@ -13,21 +13,21 @@ use crate::units::dimension::{RatioDimension, StressDimension};
 /// Properties of a table that its headings do not state.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TestFormat {
-    /// The test of all rows, where no column names it.
+    /// Test of all rows, if no column names it.
     pub mode: Option<Mode>,
     /// Measure of the strain.
     pub strain: Option<StrainMeasure>,
     /// Measure of the stress.
     pub stress: Option<TestStressMeasure>,
-    /// Unit of a stress without one.
+    /// Unit of stresses without one.
     pub stress_unit: Option<String>,
-    /// Heading of the strain, of several.
+    /// Heading of the strain, if there are several.
     pub strain_column: Option<String>,
-    /// Heading of the stress, of several.
+    /// Heading of the stress, if there are several.
     pub stress_column: Option<String>,
 }
 
-/// A table that was read.
+/// Result of reading a table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImportedTest {
     /// States of the test.
@@ -57,11 +57,11 @@ impl TestData {
 
     /// Reads a table as [`crate::table`] does: a column of stretches or strains and one of stresses, with a
     /// column of the [`Mode`] or for one test; or two of each (`stretch_1`, `stretch_2`, `nominal_1 [MPa]`,
-    /// …). A strain is an engineering one and a stress a nominal one where neither heading nor `meaning` says
-    /// more. Blank stresses were not measured.
+    /// …). By default, strains are engineering strains and stresses nominal ones, unless the heading or
+    /// `format` says otherwise. Blank stresses were not measured.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], and what [`TestData::parse_as`] refuses.
+    /// [`crate::Error::Io`]; errors of [`TestData::parse_as`].
     pub fn read_as(path: impl AsRef<Path>, meaning: &TestFormat) -> Result<ImportedTest, crate::Error> {
         let path = path.as_ref();
         let bytes = std::fs::read(path).map_err(crate::Error::from_io("read", path))?;
@@ -71,9 +71,9 @@ impl TestData {
     /// Parses the bytes of a file as [`TestData::read_as`] does.
     ///
     /// # Errors
-    /// [`Error::Data`] with line and column: headings, units and modes that are not known or leave several
-    /// possibilities, what is no number, a stretch that is not positive, strains that look like stretches or
-    /// the other way round, a stiffness below zero, no measurement at all.
+    /// [`Error::Data`] with line and column: headings, units and modes that are unknown or ambiguous, text
+    /// instead of numbers, a stretch that is not positive, strains that look like stretches or vice versa, a
+    /// stiffness below zero, no measurement at all.
     pub fn parse_as(name: &str, bytes: Vec<u8>, meaning: &TestFormat) -> Result<ImportedTest, Error> {
         let file = table::Table::parse(name, bytes).map_err(located)?;
         let columns = TestColumns::of(&file, meaning).map_err(located)?;
@@ -89,12 +89,12 @@ fn located(error: table::Error) -> Error {
     Error::Data { what: path.display().to_string(), reason }
 }
 
-/// A column and its measure.
+/// Column and its measure.
 #[derive(Clone)]
 struct TestColumn<M> {
     column: usize,
     measure: M,
-    /// The heading does not say which.
+    /// True if the heading does not name the measure.
     assumed: bool,
     compressive: bool,
     unit: Option<String>,
@@ -310,7 +310,7 @@ impl TestColumns {
         Ok(ImportedTest { description: self.describe(file, &table), table, notes })
     }
 
-    /// The test of a row, and whether it is compression.
+    /// Returns the test of a row; true if it is compression.
     fn test(
         &self,
         file: &table::Table,
@@ -327,7 +327,7 @@ impl TestColumns {
         })
     }
 
-    /// Strains and stresses that headings or tests call compressive are below zero.
+    /// Makes strains and stresses negative that headings or tests call compressive.
     fn turn(&self, rows: &mut [TestRow], notes: &mut Vec<String>) {
         let (strain, stress) = (&self.strains[0], &self.stresses[0]);
         if self.strains.len() == 2 {
@@ -381,7 +381,7 @@ impl TestColumns {
     }
 }
 
-/// A column that is looked for.
+/// Column to be found.
 struct Wanted<'a, M> {
     key: &'static str,
     name: Option<&'a str>,
@@ -431,7 +431,7 @@ fn choose<M: Copy + PartialEq>(
         .filter_map(|(i, role)| Some((i, (wanted.of)(role.what)?, role)))
         .collect();
     let of = |measure: Option<M>| all.iter().filter(move |one| one.1 == measure).collect::<Vec<_>>();
-    // named measures in their order, then those that name none, then the last; what the key says before all
+    // named measures in their order, then those that name none, then the last; the key before all
     let mut order: Vec<Option<M>> = wanted.order.iter().copied().map(Some).collect();
     order.insert(order.len() - 1, None);
     if let Some(asked) = wanted.measure {

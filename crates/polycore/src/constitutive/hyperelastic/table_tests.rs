@@ -145,7 +145,7 @@ fn keys_settle_what_headings_leave_open() {
     assert_eq!(state.stretches[0], 0.5_f64.exp());
 }
 
-/// The tail of a broken specimen is no material; an unloading is.
+/// Rows after a break are left out, those of an unloading are kept.
 #[test]
 fn what_follows_the_break_is_left_out() {
     let torn = "stretch,nominal_MPa\n1.5,0.3\n2,0.6\n2.5,1\n2.52,0.2\n2.6,0.01\n";

@@ -30,7 +30,7 @@ pub(super) const YEOH: ModelDescriptor = ModelDescriptor {
 impl Yeoh {
     const NAME: &'static str = "Yeoh";
 
-    /// C₁ > 0, C₂, C₃ of any sign, in Pa. Where W falls with I₁ the law is unstable.
+    /// Builds the law from C₁ > 0 and C₂, C₃ of any sign, in Pa. If W falls with I₁ the law is unstable.
     ///
     /// # Errors
     /// [`Error::Parameter`].

@@ -25,7 +25,7 @@ pub enum Activation {
 }
 
 impl Activation {
-    /// All of them.
+    /// All activations.
     pub const ALL: [Self; 7] =
         [Self::Linear, Self::Relu, Self::Softplus, Self::Tanh, Self::Sigmoid, Self::Silu, Self::Elu];
 
@@ -42,7 +42,7 @@ impl Activation {
         }
     }
 
-    /// Values, first and second derivatives of a list; lists that are empty are not wanted.
+    /// Computes values, first and second derivatives of a list; empty lists are skipped.
     #[inline(always)]
     pub(super) fn fill<T: Real, const FUSED: bool>(
         self,
@@ -90,7 +90,7 @@ fn fill<F: SmoothFunction, T: Real, const FUSED: bool>(
     }
 }
 
-/// A function of one variable with two derivatives, without branches.
+/// Function of one variable with two derivatives, without branches.
 trait SmoothFunction {
     fn derivatives<T: Real, const FUSED: bool>(x: T) -> [T; 3];
 }
@@ -155,7 +155,7 @@ impl SmoothFunction for Silu {
     fn derivatives<T: Real, const FUSED: bool>(x: T) -> [T; 3] {
         let s = logistic(x, exp_of_minus_size::<T, FUSED>(x));
         let slope = s * (T::ONE - s);
-        // far out the slope is 0, and so is what it multiplies, also where x is infinite
+        // far out the slope is 0, and so is its product, also where x is infinite
         let bent = if slope == T::ZERO { T::ZERO } else { x * slope };
         [x * s, s + bent, (slope + slope) + bent * (T::ONE - s - s)]
     }
@@ -205,7 +205,7 @@ mod tests {
                     activation.derivatives(x.clamp(-3e38, 3e38) as f32).iter().all(|value| value.is_finite())
                 );
             }
-            // a fault is not swallowed
+            // NaN is not hidden
             assert!(activation.derivatives(f64::NAN)[0].is_nan(), "{activation:?}");
         }
         evidence::near("ReLU of −1", Activation::Relu.derivatives(-1.0)[0], 0.0, 0.0);

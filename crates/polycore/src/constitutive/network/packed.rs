@@ -11,10 +11,10 @@ use aligned_vec::{AVec, ConstAlign};
 use pulp::Simd;
 use std::ops::Range;
 
-/// Numbers that begin where a cache line does: a vector that lies across two lines costs two loads.
+/// Numbers aligned to cache lines: a vector that lies across two lines costs two loads.
 type AlignedVec<T> = AVec<T, ConstAlign<64>>;
 
-/// Most columns of one product: a value and eight slopes.
+/// Largest number of columns of one product: a value and eight slopes.
 pub(super) const MOST_COLUMNS: usize = 9;
 
 /// W and b of one layer, packed.

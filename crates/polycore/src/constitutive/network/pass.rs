@@ -5,10 +5,10 @@ use super::real::Real;
 use super::{Activation, Layer, Network};
 use pulp::{Arch, Simd, WithSimd};
 
-/// Values whose being 0 is one word of bits.
+/// Number of values whose zeros are marked in one word of bits.
 const GROUP: usize = 64;
 
-/// Points that a batch takes side by side.
+/// Number of points of a batch.
 pub(in crate::constitutive) const BATCH: usize = 8;
 
 /// Memory for evaluations, reused between them: nothing is allocated while the widths stay the same.
@@ -78,7 +78,7 @@ impl<T: Real> Tape<T> {
         }
     }
 
-    /// The outputs (0) or their derivatives by input c − 1; of a batch those of point c.
+    /// Outputs (c = 0), or their derivatives with respect to input c − 1; in a batch, the outputs at point c.
     pub(super) fn output(&self, c: usize) -> &[T] {
         self.layers.last().map_or(&[], |last| &last.values[c * last.stride..c * last.stride + last.outputs])
     }
@@ -90,13 +90,13 @@ impl<T: Real> Tape<T> {
     }
 }
 
-/// Runs a pass with the widest instructions of this machine; returns the second derivatives, zero if not
-/// wanted.
+/// Runs a pass with the widest instructions of this machine; returns the second derivatives, or zero if not
+/// requested.
 pub(super) fn run<T: Real>(network: &Network<T>, want: PassOutput, tape: &mut Tape<T>) -> Curvature<T> {
     Arch::new().dispatch(NetworkPass { network, want, tape })
 }
 
-/// Second derivatives by up to eight inputs.
+/// Second derivatives with respect to up to eight inputs.
 pub(super) type Curvature<T> = [[T; MOST_COLUMNS - 1]; MOST_COLUMNS - 1];
 
 struct NetworkPass<'a, T> {
@@ -163,7 +163,7 @@ fn forward<T: Real, S: Simd, const FUSED: bool>(
     }
 }
 
-/// Inputs of a product that are not 0: after a `relu` at one point those that let through, else all.
+/// Inputs of a product that are not 0: after a `relu` at one point the active ones, else all.
 #[inline(always)]
 fn find_active<'a, T: Real>(values: &[T], sparse: bool, all: &'a [u32], active: &'a mut [u32]) -> &'a [u32] {
     let width = values.len();
@@ -305,7 +305,7 @@ mod tests {
     use super::*;
     use crate::constitutive::network::Architecture;
 
-    /// Machines without vectors, or with narrower ones, give the same numbers to rounding.
+    /// Machines without vectors, or with narrower ones, give the same numbers up to rounding.
     #[test]
     fn every_instruction_set_agrees() {
         let hidden = [(40, Activation::Relu), (33, Activation::Softplus), (20, Activation::Tanh)];

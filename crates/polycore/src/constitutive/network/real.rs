@@ -8,9 +8,9 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 pub trait SimdLanes: Copy {
     /// A vector.
     type Vector<S: Simd>: Copy;
-    /// Outputs that stand side by side in packed weights: 128 bytes.
+    /// Number of adjacent outputs in packed weights: 128 bytes.
     const PANEL: usize;
-    /// All lanes alike.
+    /// Sets all lanes to a value.
     fn splat<S: Simd>(simd: S, value: Self) -> Self::Vector<S>;
     /// a·b + c.
     fn mul_add<S: Simd>(
@@ -21,9 +21,9 @@ pub trait SimdLanes: Copy {
     ) -> Self::Vector<S>;
     /// The sum of the lanes.
     fn sum<S: Simd>(simd: S, a: Self::Vector<S>) -> Self;
-    /// A list as whole vectors; a rest is left out.
+    /// List as whole vectors; the remainder is left out.
     fn vectors<S: Simd>(list: &[Self]) -> &[Self::Vector<S>];
-    /// A list as whole vectors to write; a rest is left out.
+    /// List as whole vectors to write; the remainder is left out.
     fn vectors_mut<S: Simd>(list: &mut [Self]) -> &mut [Self::Vector<S>];
 }
 

@@ -11,7 +11,7 @@ use nalgebra::{SMatrix, SVector};
 /// Inputs of the networks at a C.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Features {
-    /// Standardised inputs (3.8); the first of them count.
+    /// Standardised inputs (3.8); only as many as the network has.
     pub values: [f64; LANES],
     /// Derivatives of the invariants of an energy, not yet standardised, with respect to the six components
     /// of C, C₁₂ counted once.
@@ -19,7 +19,7 @@ pub struct Features {
 }
 
 impl Surrogate<f64> {
-    /// The inputs at `c`; those of an `ann` are the components of C themselves and have no slopes.
+    /// Inputs at `c`; those of an `ann` are the components of C and have no slopes.
     pub fn features(&self, c: &Voigt) -> Features {
         let mut features = Features { values: [0.0; LANES], slopes: [[0.0; 6]; LANES] };
         let local = self.input(&(*c).into(), &mut features.values);
@@ -36,7 +36,7 @@ impl Surrogate<f64> {
     }
 }
 
-/// Energy, ∂W/∂c (or S of an `ann`) and their derivatives by c.
+/// Energy, ∂W/∂c (or S of an `ann`) and their derivatives with respect to c.
 pub(super) struct Member<T> {
     pub energy: T,
     pub first: [T; 6],
@@ -44,7 +44,7 @@ pub(super) struct Member<T> {
 }
 
 impl<T: Real + nalgebra::Scalar> Surrogate<T> {
-    /// S at each C with its uncertainty, to the same bits as one by one, at less cost.
+    /// Computes S at each C with its uncertainty, with the same bits as one by one, at less cost.
     ///
     /// # Errors
     /// Those of [`Surrogate::stress`], with the place in the list; a list of predictions of another length.
@@ -95,8 +95,8 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         Ok(())
     }
 
-    /// S and the tangent 2 ∂S/∂C at each C with their uncertainty: the bits of [`Surrogate::tangent`], one
-    /// after the other (a tangent fills the registers by itself).
+    /// Computes S and the tangent 2 ∂S/∂C at each C with their uncertainty: the bits of
+    /// [`Surrogate::tangent`], one after the other (a tangent fills the registers by itself).
     ///
     /// # Errors
     /// Those of [`Surrogate::tangent`], with the place in the list; a list of predictions of another length.
@@ -254,7 +254,7 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         result
     }
 
-    /// W and its derivatives by c from those of a network by its inputs.
+    /// W and its derivatives with respect to c from those of a network with respect to its inputs.
     fn energetic(
         &self,
         local: &[T; 6],
@@ -307,7 +307,7 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
     }
 }
 
-/// The error of one point of a list.
+/// Error of one point of a list.
 fn at_point(point: usize, error: Error) -> Error {
     match error {
         Error::Invalid { name, found, allowed } => {

@@ -1,11 +1,11 @@
-//! Models to test with.
+//! Models for tests.
 
 use super::{Header, Kind, Surrogate, Symmetry};
 use crate::constitutive::Error;
 use crate::constitutive::network::Activation::{Elu, Sigmoid, Silu, Softplus, Tanh};
 use nalgebra::Rotation3;
 
-/// Axes turned by 0.3, −0.5, 0.8 about x, y, z.
+/// Axes rotated by 0.3, −0.5, 0.8 about x, y, z.
 fn turned() -> [[f64; 3]; 3] {
     let q = Rotation3::from_euler_angles(0.3, -0.5, 0.8);
     [0, 1, 2].map(|i| [0, 1, 2].map(|j| q[(i, j)]))

@@ -11,14 +11,14 @@ use std::collections::HashMap;
 use std::io::Write;
 use std::path::Path;
 
-/// The key of the header, which is also the version of the format.
+/// Key of the header, and version of the format.
 const KEY: &str = "mdsurrogate law 1";
 
-/// A larger file is no law.
+/// Largest size of a file, bytes.
 const LARGEST: u64 = 4 << 30;
 
 impl Surrogate<f64> {
-    /// Writes the law, whole or not at all.
+    /// Writes the law; an error leaves no partial file.
     ///
     /// # Errors
     /// I/O errors.
@@ -28,10 +28,9 @@ impl Surrogate<f64> {
         crate::file::atomic_write(path, |file| file.write_all(&bytes))
     }
 
-    /// Reads a law; numbers come back to the bit.
+    /// Reads a law, to the bit.
     ///
-    /// # Errors
-    /// [`Error::File`] for what is no safetensors file or has no header of ours, and for weights that do not
+    /// [`Error::File`] for a file that is not safetensors or lacks our header, and for weights that do not
     /// fit the architecture of the header; I/O errors.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, crate::Error> {
         let path = path.as_ref();
@@ -43,10 +42,10 @@ impl Surrogate<f64> {
         Ok(Self::decode(&bytes).map_err(|(found, allowed)| Error::file(path, found, allowed))?)
     }
 
-    /// The law as the bytes of its file.
+    /// Serialises the law to the bytes of its file.
     ///
     /// # Errors
-    /// What is wrong with a law that cannot be written.
+    /// Reason for which the law cannot be written.
     pub fn to_bytes(&self) -> Result<Vec<u8>, String> {
         let mut data = Vec::new();
         for (m, member) in self.members.iter().enumerate() {
@@ -67,10 +66,10 @@ impl Surrogate<f64> {
         safetensors::serialize(views, Some(metadata)).map_err(|error| error.to_string())
     }
 
-    /// The law of the bytes of a file.
+    /// Reads a law from the bytes of a file.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for what [`Self::read`] refuses.
+    /// [`Error::Invalid`] for the errors of [`Self::read`].
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, Error> {
         Self::decode(bytes).map_err(|(found, allowed)| Error::invalid("law", found, allowed))
     }

@@ -7,10 +7,10 @@ use crate::constitutive::network::{Activation, Architecture};
 use crate::tensor::voigt::NAMES;
 use serde::{Deserialize, Serialize};
 
-/// The axes of the data.
+/// Axes of the data.
 const AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
-/// Convex functions that never fall.
+/// Convex functions that never decrease.
 const CONVEX: [Activation; 4] = [Activation::Linear, Activation::Relu, Activation::Softplus, Activation::Elu];
 
 /// Function that the networks compute.
@@ -36,7 +36,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// An energy in the axes of the data.
+    /// Creates an energy in the axes of the data.
     pub fn energy(symmetry: Symmetry) -> Self {
         Self::Energy { symmetry, axes: AXES, polyconvex: false, norms: false }
     }
@@ -105,15 +105,15 @@ pub struct Header {
     pub input_mean: Vec<f64>,
     /// Standard deviation of each input (3.8); 0: the input had no variance and is mapped to 0.
     pub input_deviation: Vec<f64>,
-    /// Added to the outputs after scaling, Pa; of an energy it has no effect.
+    /// Added to the outputs after scaling, Pa; without effect on an energy.
     pub output_mean: Vec<f64>,
     /// Unit of each output, Pa (J/m³).
     pub output_deviation: Vec<f64>,
-    /// Least and greatest C of each component in the training data; equal where a component was never seen to
-    /// change.
+    /// Least and greatest value of each component of C in the training data; equal for a component that never
+    /// changed.
     pub training_box: [[f64; 2]; 6],
-    /// Representatives of the training strains, farther from which than any training row a prediction is
-    /// flagged.
+    /// Representatives of the training strains: a prediction is flagged if it is farther from them than any
+    /// training row.
     #[serde(default)]
     pub support: Option<Support>,
     /// Spread of the ensemble, Pa, beyond which a prediction is flagged
@@ -128,7 +128,8 @@ pub struct Header {
 }
 
 impl Header {
-    /// A law with inputs as they are, outputs in MPa (or MJ/m³), and a box of nothing but C = I.
+    /// Creates the header of a law with unscaled inputs, outputs in MPa (or MJ/m³), and a box that contains C
+    /// = I alone.
     pub fn new(kind: Kind, hidden: &[(usize, Activation)], members: usize) -> Self {
         let (inputs, outputs) = (kind.inputs(), kind.outputs());
         Self {
@@ -147,6 +148,8 @@ impl Header {
         }
     }
 
+    /// Checks that the parts fit together.
+    ///
     /// # Errors
     /// [`Error::Invalid`] for parts that do not fit together or numbers that are not finite.
     pub fn check(&self) -> Result<(), Error> {

@@ -107,7 +107,7 @@ fn sum<T: Real>(monomials: &[Monomial<'_>], c: &[T; 6]) -> T {
     sum
 }
 
-/// The product of a monomial's components but those at two places.
+/// Product of a monomial's components without those at two places.
 fn product<T: Real>(factors: &[usize], c: &[T; 6], without: usize, and: usize) -> T {
     let mut product = T::ONE;
     for (place, &a) in factors.iter().enumerate() {
@@ -118,7 +118,7 @@ fn product<T: Real>(factors: &[usize], c: &[T; 6], without: usize, and: usize) -
     product
 }
 
-/// The monomials of the derivative of a polynomial by the components `by`.
+/// Monomials of the derivative of a polynomial with respect to the components `by`.
 pub fn derivative(monomials: &[Monomial<'_>], by: &[usize]) -> Vec<(f64, Vec<usize>)> {
     let Some((&a, rest)) = by.split_first() else {
         return monomials.iter().map(|(coefficient, factors)| (*coefficient, factors.to_vec())).collect();

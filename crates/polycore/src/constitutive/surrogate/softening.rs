@@ -1,11 +1,11 @@
-//! A damage variable: the stress of an energy that is lower on unloading.
+//! Damage variable: lowers the stress of an energy on unloading.
 
 use super::{Prediction, Surrogate, Workspace};
 use crate::constitutive::{Error, Law};
 use crate::tensor::Voigt;
 use serde::{Deserialize, Serialize};
 
-/// (m/m₀)^c at most.
+/// Bound of (m/m₀)^c.
 const BEYOND: f64 = 1e12;
 
 /// Pseudo-elasticity (Ogden and Roxburgh 1999, <https://doi.org/10.1098/rspa.1999.0431>) with a monotone
@@ -33,6 +33,8 @@ pub struct SofteningHistory {
 }
 
 impl Softening {
+    /// Checks the units.
+    ///
     /// # Errors
     /// [`Error::Invalid`] for numbers that are negative or not finite, and for no unit.
     pub fn check(&self) -> Result<(), Error> {
@@ -67,7 +69,7 @@ impl Softening {
 }
 
 impl Surrogate<f64> {
-    /// The same energy with softening.
+    /// Adds softening to the energy.
     ///
     /// # Errors
     /// [`Softening::check`]; [`Error::Invalid`] for a law without an energy.
@@ -77,8 +79,8 @@ impl Surrogate<f64> {
         Ok(self)
     }
 
-    /// S at C after a history, which it brings up to date; ℂ on unloading is (1 − d) ℂ₀ − S₀ ⊗ S₀ ∂d/∂W. As
-    /// [`Surrogate::stress`] and [`Surrogate::tangent`] for a law without softening.
+    /// Computes S at C after a history and updates the history; ℂ on unloading is (1 − d) ℂ₀ − S₀ ⊗ S₀ ∂d/∂W.
+    /// For a law without softening it equals [`Surrogate::stress`] and [`Surrogate::tangent`].
     ///
     /// # Errors
     /// Those of [`Surrogate::tangent`].

@@ -12,10 +12,10 @@ use crate::tensor::voigt::NAMES;
 use pulp::{Arch, Simd, WithSimd};
 use serde::{Deserialize, Serialize};
 
-/// Most representatives that a law may have.
+/// Largest number of representatives of a law.
 pub const MOST_REPRESENTATIVES: usize = 4096;
 
-/// Representatives looked at side by side.
+/// Number of representatives compared at once.
 const BLOCK: usize = 16;
 
 /// Representatives of the training strains.
@@ -26,8 +26,8 @@ pub struct Support {
     pub points: Vec<[f64; 6]>,
     /// Inverse standard deviation of each component of C in the training data; 0 where it never changed.
     pub weights: [f64; 6],
-    /// The greatest distance of a training row from its nearest representative, in standard deviations; of
-    /// few rows, most of which are representatives, the greatest distance of a row from its nearest
+    /// Greatest distance of a training row from its nearest representative, in standard deviations. For few
+    /// rows, most of which are representatives, it is the greatest distance of a row from its nearest
     /// neighbour.
     pub radius: f64,
 }
@@ -52,7 +52,7 @@ impl Support {
         let mut weights = [0.0; 6];
         for (a, weight) in weights.iter_mut().enumerate() {
             let variance = rows.iter().map(|row| (row[a] - mean[a]).powi(2)).sum::<f64>() / count;
-            // the rest of a constant is rounding
+            // variance of a constant is rounding
             if variance.sqrt() > super::UNSEEN {
                 *weight = 1.0 / variance.sqrt();
             }
@@ -76,9 +76,8 @@ impl Support {
                 *distance = distance.min(square(row, &rows[farthest]));
             }
         }
-        // where most rows are representatives themselves, that distance is that of the closest rows, or none,
-        // and every new strain would be far: there the limit is the greatest distance of a row from its
-        // neighbour
+        // if most rows are representatives, that distance is that of the closest rows, or 0, and every new
+        // strain would be far: then the limit is the greatest distance of a row from its neighbour
         if 2 * points.len() > rows.len() {
             let others = |k: usize| rows.iter().enumerate().filter(move |(j, _)| *j != k).map(|(_, row)| row);
             let neighbour =
@@ -89,6 +88,8 @@ impl Support {
         Ok(Self { points: points.into_iter().map(Into::into).collect(), weights, radius: radius.sqrt() })
     }
 
+    /// Checks the representatives.
+    ///
     /// # Errors
     /// [`Error::Invalid`] for no or too many representatives, or numbers that are not finite.
     pub fn check(&self) -> Result<(), Error> {
@@ -117,13 +118,13 @@ impl Support {
     }
 }
 
-/// A [`Support`] in the order in which distances are taken.
+/// [`Support`] in the order in which distances are computed.
 #[derive(Debug, Clone)]
 pub(super) struct Nearest<T> {
     /// Weighted components of [`BLOCK`] representatives each.
     blocks: Vec<[[T; BLOCK]; 6]>,
     weights: [T; 6],
-    /// A little more than the radius: rounding moves no training row out.
+    /// Slightly more than the radius: rounding moves no training row out.
     pub limit: f64,
 }
 

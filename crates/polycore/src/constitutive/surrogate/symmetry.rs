@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 /// A monomial: coefficient, and the components that are multiplied.
 pub type Monomial<'a> = (f64, &'a [usize]);
 
-/// A symmetry of the crystal, the third of the material axes being the special one.
+/// Symmetry of the crystal; the third of the material axes is the special one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
@@ -51,7 +51,7 @@ impl Symmetry {
     pub const ALL: [Self; 5] =
         [Self::Triclinic, Self::Monoclinic, Self::Orthotropic, Self::Transverse, Self::Isotropic];
 
-    /// The material axes about which half a turn changes nothing.
+    /// Material axes of two-fold symmetry.
     pub fn two_fold_axes(self) -> &'static [usize] {
         match self {
             Self::Triclinic => &[],
@@ -96,9 +96,8 @@ impl Symmetry {
         }
     }
 
-    /// The same in functions that are convex in (F, cof F, J): |F aᵢ|² = aᵢ·C aᵢ and |cof F aᵢ|² = aᵢ·cof C
-    /// aᵢ or their sums, and last J² (whose root is the input). None where too few are known: triclinic and
-    /// monoclinic.
+    /// Invariants that are convex in (F, cof F, J): |F aᵢ|² = aᵢ·C aᵢ and |cof F aᵢ|² = aᵢ·cof C aᵢ or their
+    /// sums, and last J² (whose root is the input). `None` if too few are known: triclinic and monoclinic.
     ///
     /// Schröder & Neff 2003, <https://doi.org/10.1016/S0020-7683(02)00458-4>.
     pub fn polyconvex_invariants(self) -> Option<&'static [&'static [Monomial<'static>]]> {
@@ -157,7 +156,7 @@ pub struct StressAtRest {
     pub along: &'static [([f64; 3], usize, usize)],
 }
 
-/// The matrix T of C' = T C (as vectors), C' in the material axes, which are the rows of `axes`.
+/// Matrix T of C' = T C (as vectors), C' in the material axes, which are the rows of `axes`.
 ///
 /// # Errors
 /// [`Error::Invalid`] unless the axes are orthonormal to 1e-9 and right-handed.
