@@ -1,4 +1,4 @@
-//! Rows of benches: what `benches/measure.rs` of a crate prints and `cargo xtask bench` reads.
+//! Rows of benches: printed by `benches/measure.rs` of a crate, read by `cargo xtask bench`.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,7 +11,7 @@ pub struct Measurement {
     pub size: u64,
     /// Threads used.
     pub threads: usize,
-    /// The number; absent where there is none.
+    /// Value; `None` if there is none.
     pub value: Option<f64>,
     /// Unit, empty for a ratio.
     pub unit: String,

@@ -1,6 +1,6 @@
 //! The `polycore` command line: fits hyperelastic laws to the data that a case names, and tabulates laws.
 
-// harness::say! prints without a panic where nobody reads any more
+// harness::say! prints without a panic if the output is closed
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
 use std::process::ExitCode;
@@ -26,7 +26,7 @@ mod cli {
 
 use cli::{exact, fits, scene};
 
-/// Fits of hyperelastic laws.
+/// Program that fits hyperelastic laws.
 struct Fits;
 
 impl case::Case for Fits {

@@ -1,4 +1,4 @@
-//! The contract of the `polycore` command line: what it prints, writes and returns.
+//! Output, files and exit codes of the `polycore` command line.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -30,7 +30,7 @@ fn polycore(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_polycore")).args(arguments).output().unwrap()
 }
 
-/// A folder with a scene and its table; the scene's path.
+/// Creates a folder with a scene and its table; returns the scene's path.
 fn folder(scene: &str) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("bar.csv"), BAR).unwrap();
@@ -114,8 +114,7 @@ fn bad_scenes_exit_with_2_and_write_nothing() {
     assert_eq!(polycore(&["run", "no/such/case.toml"]).status.code(), Some(2));
 }
 
-/// Two scenes of one folder have results of their own, the parameters are printed, and so is what `peri`
-/// takes.
+/// Two scenes of one folder have separate results; the parameters and the block for `peri` are printed.
 #[test]
 fn what_a_newcomer_sees() {
     let (folder, scene) = folder(SCENE);
@@ -188,7 +187,7 @@ fn trials_pass_and_fail() {
     assert_eq!(run(&scene, &out).status.code(), Some(0));
     let report = Report::read(out.join("report.json")).unwrap();
     assert_eq!(report.trials.len(), 3);
-    // a law that answers where it must refuse, one that refuses in other words, and a wrong figure
+    // a law that answers instead of refusing, one that refuses in other words, and a wrong figure
     for (from, to) in
         [("5.0625]", "6.0]"), ("locking value", "overflow"), ("reference = 1.875", "reference = 2.0")]
     {
@@ -264,7 +263,7 @@ fn completions() {
     }
 }
 
-/// A scene of one table, all laws, `keys` in its entry.
+/// Scene of one table, all laws, `keys` in its entry.
 fn fitted(table: &str, keys: &str) -> (tempfile::TempDir, Output) {
     let scene = format!(
         "version = 1\nprogram = \"polycore\"\n[fit]\n[[fit.data]]\nname = \"t\"\nfile = \"bar.csv\"\n{keys}\n"
@@ -281,7 +280,7 @@ fn neo_hookean(unit: &str, modulus: f64, stretches: impl IntoIterator<Item = f64
     format!("stretch,nominal_{unit}\n{}", stretches.into_iter().map(row).collect::<String>())
 }
 
-/// Compression, one-term data, gels: every law is fitted or named, and what is written has its digits.
+/// Compression, one-term data, gels: every law is fitted or reported, and written numbers have all digits.
 #[test]
 fn ordinary_tables_give_every_law() {
     let laws = 10;
@@ -315,7 +314,7 @@ fn ordinary_tables_give_every_law() {
     }
 }
 
-/// Few data: laws of more parameters are named as failed, the others are kept.
+/// Few data: laws with more parameters are reported as failed, the others are kept.
 #[test]
 fn a_law_that_fails_is_named() {
     let (folder, result) = fitted("stretch,nominal_MPa\n1.5,0.4\n2,0.7\n3,1.1\n", "");
@@ -368,12 +367,12 @@ fn tables_of_laboratories() {
         assert_eq!(result.status.code(), Some(2), "{error}");
         assert!(parts.iter().all(|part| error.contains(part)), "{error}");
     }
-    // strains that are named as such by the key
+    // strains whose measure the key names
     let (_folder, result) = fitted(strains, "strain = \"engineering\"");
     assert_eq!(result.status.code(), Some(0), "{}", text(&result.stderr));
 }
 
-/// `cross` says where a law may be used: Ogden's term of α < 0, which fits bars, is far off in equibiaxial
+/// `cross` reports where a law is safe: Ogden's term of α < 0, which fits bars, is far off in equibiaxial
 /// tension.
 #[test]
 fn cross_ends_in_a_verdict() {
@@ -398,7 +397,7 @@ fn cross_ends_in_a_verdict() {
     assert!(fits.contains("bar,ogden-1,r2.sheet,-"), "{fits}");
 }
 
-/// Names of other programs lead to the law that they are here.
+/// Names used by other programs lead to the law of this one.
 #[test]
 fn laws_of_other_names_get_advice() {
     for (name, advice) in [

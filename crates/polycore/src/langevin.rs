@@ -1,5 +1,4 @@
 //! The Langevin function 𝓛(β) = coth β − 1/β of chain statistics, its inverse, and the energies that follow.
-//! energies.
 //!
 //! A chain of n rigid links at relative extension x = r/(n b) ∈ (−1, 1) carries the dimensionless force
 //! β = 𝓛⁻¹(x) (thesis (2.36); Kuhn and Grün 1942, doi:10.1007/BF01793684). Everything here is in

@@ -10,7 +10,7 @@ pub const DRAWS: usize = 1000;
 const NORMAL: usize = 1000;
 
 /// Draws parameters of a fit from Student's multivariate t about the minimum, with the covariance s²(JᵀJ)⁻¹
-/// as its s²(JᵀJ)⁻¹ as its scale and the degrees of freedom of the residuals. It is the posterior of a linear
+/// as its scale and the degrees of freedom of the residuals. It is the posterior of a linear
 /// model with errors of one unknown size and no prior knowledge of either (Box & Tiao, *Bayesian Inference in
 /// Statistical Analysis*, 1973, section 2.7), and Laplace's approximation of any other. The same seed gives
 /// the same draws. `None` if the covariance is not positive definite.

@@ -1,4 +1,4 @@
-//! The symbols that hosts call. `umatht_` of [`umatht`] comes along.
+//! Symbols that hosts call. `umatht_` of [`umatht`] is included.
 
 use crate::{Error, Material, Print};
 use polycore::tensor::voigt::{self, Voigt, Voigt6x6};
@@ -10,11 +10,11 @@ const NAME: usize = 80;
 /// Ratio to which a host may cut its increment if there is no stress.
 const CUT: f64 = 0.25;
 
-/// A material with its name and constants.
+/// Material with its name and constants.
 type CachedMaterial = (Vec<u8>, Vec<f64>, Material);
 
 thread_local! {
-    /// The last material on this thread: hosts call once an integration point and iteration.
+    /// Last material on this thread: hosts call once per integration point and iteration.
     static LAST: RefCell<Option<CachedMaterial>> = const { RefCell::new(None) };
 }
 
@@ -32,7 +32,7 @@ fn with<R>(name: &[u8], constants: &[f64], work: impl FnOnce(&Material) -> R) ->
     })
 }
 
-/// A host cannot go on, and no Fortran routine returns an error.
+/// Ends the process: a host cannot continue, and no Fortran routine returns an error.
 fn end(message: &Error) -> ! {
     eprintln!("{message}");
     std::process::exit(2)
@@ -45,12 +45,11 @@ fn states(found: usize) {
 }
 
 /// UMAT as Abaqus declares it (*Abaqus User Subroutines Guide*, 1.1.44): three normal and three shear
-/// stresses. Rubbers take F from `DFGRD1`, prints the strains `STRAN` + `DSTRAN`. Where a law has no stress,
-/// `PNEWDT` asks for a quarter of the increment.
+/// stresses. Rubbers use F from `DFGRD1`, prints the strains `STRAN` + `DSTRAN`. If a law has no stress,
+/// `PNEWDT` requests a quarter of the increment.
 ///
-/// Energies are those of a unit of the deformed volume, in the host's unit of stress: `SSE` is W/J of a
-/// rubber; of a print the elastic energy, beside what crystals took as they grew and melted (`SPD`) and what
-/// relaxed (`SCD`).
+/// Energies are per deformed volume, in the host's unit of stress: `SSE` is W/J of a rubber or the elastic
+/// energy of a print, `SPD` the energy dissipated by growing and melting crystals, `SCD` that of relaxation.
 ///
 /// # Safety
 /// As in Fortran: every pointer is valid for the length that `NTENS`, `NSTATV` and `NPROPS` tell, and nothing
@@ -119,7 +118,7 @@ pub unsafe extern "C" fn umat_(
             let (turn, time, temperature) = unsafe { (&*drot, *dtime, *temp + *dtemp) };
             let mut old = state.to_vec();
             turned(&mut old, turn);
-            // the host has turned its own strain
+            // the host has rotated its own strain
             old[3..9].copy_from_slice(change[0].as_slice());
             let (stress, tangent, energies) =
                 print.advance(&old, state, temperature, time, |before| before + change[1])?;
@@ -148,7 +147,7 @@ pub unsafe extern "C" fn umat_(
     }
 }
 
-/// The elastic strains of a state in axes turned by `DROT`.
+/// Rotates the elastic strains of a state by `DROT`.
 fn turned(state: &mut [f64], turn: &[f64; 9]) {
     if *turn == [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0] {
         return;
@@ -210,7 +209,7 @@ pub unsafe extern "C" fn umat_user_(
         let place = states * (length(*iint - 1) + length(*mi) * length(*iel - 1));
         (
             std::slice::from_raw_parts(amat.cast::<u8>(), NAME),
-            // CalculiX tells the number of constants so
+            // CalculiX encodes the number of constants like this
             std::slice::from_raw_parts(elconloc, length(-kode - 100)),
             Voigt::from_column_slice(&*emec),
             std::slice::from_raw_parts(xstateini.wrapping_add(place), states),
@@ -234,7 +233,7 @@ pub unsafe extern "C" fn umat_user_(
         }
     });
     match answer {
-        // SAFETY: the caller's promise; `stiff` is asked for unless ICMD is 3
+        // SAFETY: the caller's promise; `stiff` is written unless ICMD is 3
         Ok((stress, tangent)) => unsafe {
             *stre = (stress - Voigt::from(*beta)).into();
             if *icmd != 3 {
@@ -246,7 +245,7 @@ pub unsafe extern "C" fn umat_user_(
     }
 }
 
-/// The upper triangle, column by column.
+/// Upper triangle, column by column.
 fn upper(tangent: &Voigt6x6) -> [f64; 21] {
     let places: Vec<(usize, usize)> = (0..6).flat_map(|b| (0..=b).map(move |a| (a, b))).collect();
     std::array::from_fn(|k| {

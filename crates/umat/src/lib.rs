@@ -1,9 +1,8 @@
-//! Materials of this workspace as UMAT: `umat_`, as Abaqus calls it, and `umat_user_`, CalculiX' own, in
-//! `libumat`.
+//! Materials of this workspace as UMAT: `umat_` for Abaqus and `umat_user_` for CalculiX, in `libumat`.
 //!
-//! The name of the material in the input of the host chooses: a hyperelastic law of [`polycore`]
+//! The name of the material in the input of the host selects a hyperelastic law of [`polycore`]
 //! (`EIGHT_CHAIN`, `NEO_HOOKEAN`, …, [`RubberMaterial`]) or the solidifying body of prints (`PRINTED_PA12`,
-//! [`Print`]); CalculiX wants `USER_` before it. `umatht_` is in the library, too.
+//! [`Print`]); CalculiX needs `USER_` before it. The library also contains `umatht_`.
 //!
 //! ```
 //! use umat::RubberMaterial;
@@ -24,7 +23,7 @@ mod tests;
 pub use print::{Dissipation, Print};
 pub use rubber::RubberMaterial;
 
-/// Why a material cannot be made, or has no stress.
+/// Error of a material's constants or state.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("umat: {what}: found {found}; allowed: {allowed}")]
 pub struct Error {
@@ -42,7 +41,7 @@ impl Error {
     }
 }
 
-/// A material of a host's input.
+/// Material of a host's input.
 pub enum Material {
     /// Hyperelastic: no state.
     Rubber(RubberMaterial),
@@ -51,14 +50,14 @@ pub enum Material {
 }
 
 impl Material {
-    /// The material of a name: that of a law, in capitals or not, with `_` or `-`, perhaps `USER_` before it
-    /// and `_…` behind it.
+    /// Creates the material of a name: that of a law, in any case, with `_` or `-`, optionally with `USER_`
+    /// before and `_…` behind it.
     ///
     /// # Errors
-    /// A name that begins with no material's; constants out of range, too few or too many.
+    /// An unknown name; constants out of range, too few or too many.
     pub fn new(name: &str, constants: &[f64]) -> Result<Self, Error> {
         let lower = name.trim().to_lowercase().replace('_', "-");
-        // CalculiX cuts its `USER` off
+        // CalculiX removes its `USER`
         let lower = lower.strip_prefix("user").unwrap_or(&lower).trim_start_matches('-');
         let is =
             |key: &str| lower.strip_prefix(key).is_some_and(|rest| rest.is_empty() || rest.starts_with('-'));

@@ -1,19 +1,19 @@
-//! The solidifying body of prints under the strains and temperatures that hosts hand over.
+//! Solidifying body of prints under the strains and temperatures of a host.
 
 use crate::Error;
 use crystfem::mechanics::SolidifyingMaxwell;
 use polycore::tensor::voigt::{Voigt, Voigt6x6};
 use umatht::{State, ThermalIncrement, respond};
 
-/// PA12 that crystallizes, shrinks and relaxes ([`SolidifyingMaxwell::pa12`]): α by its own integration of
-/// the temperature that the host gives. Strains are small.
+/// PA12 that crystallizes, shrinks and relaxes ([`SolidifyingMaxwell::pa12`]); it integrates α from the
+/// temperatures of the host. Strains are small.
 pub struct Print {
     body: SolidifyingMaxwell,
     /// Constants of [`umatht::respond`].
     thermal: [f64; 5],
-    /// Temperature of birth, in the host's degrees.
+    /// Temperature at birth, in the host's degrees.
     birth: f64,
-    /// Pa in a unit of stress of the host.
+    /// Value in Pa of the host's unit of stress.
     unit: f64,
 }
 
@@ -23,25 +23,25 @@ pub struct Print {
 pub struct Dissipation {
     /// Increase of the elastic energy.
     pub stored: f64,
-    /// Taken by growing and melting crystals, and by softening.
+    /// Dissipated by growing and melting crystals, and by softening.
     pub crystals: f64,
-    /// Dissipated by relaxation, that of the melt included.
+    /// Dissipated by relaxation, including that of the melt.
     pub viscous: f64,
 }
 
-/// The strains of a branch.
+/// Elastic strains of a branch.
 const SIX: usize = 6;
 
 impl Print {
     /// Name in the input of a host, without `USER_`.
     pub const NAME: &'static str = "printed-pa12";
-    /// z, α, T (K), the total strain at the end (6), and the elastic strains of the branches (6 × 6); all 0
-    /// at birth.
+    /// Number of state variables: z, α, T (K), the total strain at the end (6), and the elastic strains of
+    /// the branches (6 × 6); all 0 at birth.
     pub const STATES: usize = 9 + 6 * SIX;
 
-    /// Constants: column of Table 4.1 (1 or 2), absolute zero (0 in kelvin, 273.15 in °C), temperature of
-    /// birth in the host's degrees (where strains begin), crystallinity X∞ at α = 1, and Pa in the host's
-    /// unit of stress (1e6 for MPa).
+    /// Creates the body from its constants: column of Table 4.1 (1 or 2), absolute zero (0 in kelvin, 273.15
+    /// in °C), temperature at birth in the host's degrees (zero strain), crystallinity X∞ at α = 1, and the
+    /// value in Pa of the host's unit of stress (1e6 for MPa).
     ///
     /// # Errors
     /// Constants out of range, too few or too many.
@@ -69,8 +69,8 @@ impl Print {
         Ok(answer.map_err(|error| Error::new(error.name, error.found, error.allowed))?.state)
     }
 
-    /// Stress, the tangent and energies after an increment to a temperature, in a time, s; `strain` gives the
-    /// total strain at the end from that at the start, shears doubled. Reads `state`, writes `new`, both of
+    /// Computes stress, tangent and energies after an increment to a temperature, in a time, s; `strain`
+    /// gives the total strain at its start and end, shears doubled. Reads `state`, writes `new`, both of
     /// [`Self::STATES`] numbers.
     ///
     /// # Errors
@@ -140,8 +140,8 @@ mod tests {
     use super::*;
     use crystfem::exact::Wall;
 
-    /// Advances a point of a plate: its strain in the plane is given, σ₃₃ = 0. Gives the stress in the plane
-    /// and its slope.
+    /// Advances a point of a plate with given strain in its plane and σ₃₃ = 0; returns the stress in the
+    /// plane and its slope.
     fn point(print: &Print, state: &[f64], new: &mut [f64], t: f64, dt: f64, plane: f64) -> (f64, f64) {
         let mut advance = |third: f64| {
             print.advance(state, new, t, dt, |_| Voigt::new(plane, plane, third, 0.0, 0.0, 0.0)).unwrap()
@@ -160,7 +160,7 @@ mod tests {
         let print = Print::new(&[1.0, 273.15, 220.0, 0.25, 1e6]).unwrap();
         let (wall, cells) = (Wall { biot: 1.0 }, 40);
         for (held, expected) in [(true, [27.5719, 27.0687]), (false, [5.5791, -14.4911])] {
-            // centres of cells, with the centre and the surface of the plate, which bear nothing
+            // centres of cells, with the centre and the surface of the plate, which have no weight
             let mut places: Vec<f64> = (0..cells).map(|k| (f64::from(k) + 0.5) / f64::from(cells)).collect();
             places.extend([0.0, 1.0]);
             let mut states = vec![vec![0.0; Print::STATES]; places.len()];

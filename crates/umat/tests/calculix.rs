@@ -1,4 +1,4 @@
-//! The materials in CalculiX 2.20, where `CALCULIX_SOURCE` names its source build.
+//! Tests of the materials in CalculiX 2.20, if `CALCULIX_SOURCE` names its source build.
 
 use evidence::hosts::{self, run};
 use polycore::constitutive::hyperelastic::{homogeneous::uniaxial, model};
@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-/// CalculiX with the library. `WITHOUT_TANGENT` in its environment: the tangent of the material at rest
-/// instead of the true one.
+/// Links CalculiX with the library. With `WITHOUT_TANGENT` in its environment it uses the tangent of the
+/// material at rest.
 fn program() -> Option<&'static Path> {
     static BUILT: OnceLock<Option<(tempfile::TempDir, PathBuf)>> = OnceLock::new();
     let built = BUILT.get_or_init(|| {
@@ -65,7 +65,7 @@ const WRAP: &str = "subroutine wrap(amat, iel, iint, kode, elconloc, emec, emec0
 end subroutine wrap
 ";
 
-/// `examples/cube.inp`, which the guide shows: the force of the incompressible law, to μ/K.
+/// Tests `examples/cube.inp`, which the guide shows: the force of the incompressible law, to μ/K.
 #[test]
 fn the_example() {
     let Some(program) = program() else { return };
@@ -117,7 +117,7 @@ fn all(planes: usize, rows: usize, columns: usize) -> impl Iterator<Item = (usiz
     (0..planes).flat_map(move |k| (0..rows).flat_map(move |j| (0..columns).map(move |i| (k, j, i))))
 }
 
-/// Load along y at the end, N, none where CalculiX gave up, and all iterations.
+/// Returns the load along y at the end, N (`None` if CalculiX failed), and all iterations.
 fn solved(program: &Path, deck: &str, tangent: bool) -> (Option<f64>, usize) {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("deck.inp"), deck).unwrap();
@@ -135,8 +135,8 @@ fn solved(program: &Path, deck: &str, tangent: bool) -> (Option<f64>, usize) {
     (numbers.get(1).copied().filter(|_| ended.status.success()), iterations)
 }
 
-/// The same sheet of our neo-Hookean law and of CalculiX' own, nearly incompressible; iterations with our
-/// tangent and with that at rest.
+/// Compares the sheet with our neo-Hookean law and with CalculiX' own, nearly incompressible; iterations with
+/// our tangent and with that at rest.
 #[test]
 fn a_notched_sheet() {
     let Some(program) = program() else { return };
@@ -252,8 +252,8 @@ fn a_plate_cools() {
             }
         }
         assert_eq!(points.len(), 2 * cells);
-        // means of elements (CalculiX takes the change of volume from an element's mean), carried on linearly
-        // to the faces
+        // means of elements (CalculiX takes the change of volume from an element's mean), extrapolated
+        // linearly to the faces
         let mean = |element: usize| 0.5 * (points[2 * element].1 + points[2 * element + 1].1);
         let out = |near: usize, far: usize| mean(near) + 0.5 * (mean(near) - mean(far));
         let found = [out(0, 1), out(cells - 1, cells - 2)];

@@ -1,11 +1,11 @@
-//! Constants of the material as hosts list them.
+//! Constants of the material in the order of hosts.
 
 use crystfem::kinetics::{self, Kinetics};
 use crystfem::material::{CONSTANT_NAMES, Polymer, Property, Semicrystalline};
 use crystfem::melting::Melting;
 use std::cell::RefCell;
 
-/// Names of the constants, in their order.
+/// Names of the constants, in order.
 pub const NAMES: [&str; 15] = [
     "conductivity",
     "specific_heat",
@@ -26,13 +26,13 @@ pub const NAMES: [&str; 15] = [
 /// Number of constants before those of the user's own kinetics.
 pub const HEAD: usize = 6;
 
-/// A number that the material cannot have.
+/// Invalid constant of the material.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("umatht: {name}: found {found}; allowed: {allowed}")]
 pub struct Error {
     /// Name of the constant.
     pub name: &'static str,
-    /// The number.
+    /// Value found.
     pub found: f64,
     /// Allowed values.
     pub allowed: String,
@@ -47,10 +47,10 @@ impl From<crystfem::Error> for Error {
     }
 }
 
-/// The material of a list of constants.
+/// Material with the host's conventions.
 pub struct HostMaterial {
     pub material: Semicrystalline,
-    /// 0 of the host's temperature, K.
+    /// Absolute temperature at 0 of the host's scale, K.
     pub absolute_zero: f64,
     /// True if the host is CalculiX.
     pub calculix: bool,
@@ -134,7 +134,7 @@ impl HostMaterial {
             specific_heat: Property::Constant(specific_heat),
             kinetics: Kinetics::new(kinetics)?,
             melting,
-            // of α alone: the host gives ΔH·X∞
+            // α alone: the host gives ΔH·X∞
             ultimate_crystallinity: 1.0,
             latent_heat: (latent > 0.0).then_some(latent),
             seed: 0.0,
@@ -144,11 +144,11 @@ impl HostMaterial {
 }
 
 thread_local! {
-    /// The constants of the last call on this thread: hosts call once an integration point and iteration.
+    /// Constants of the last call on this thread: hosts call once per integration point and iteration.
     static LAST: RefCell<Option<(Vec<f64>, HostMaterial)>> = const { RefCell::new(None) };
 }
 
-/// Works with the material of a list of constants.
+/// Calls `work` with the material of a list of constants.
 ///
 /// # Errors
 /// A constant out of range.

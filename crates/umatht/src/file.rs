@@ -1,14 +1,14 @@
-//! Constants that a host does not pass: CalculiX takes six of a thermal material.
+//! Constants in a file, for hosts that do not pass all: CalculiX takes six of a thermal material.
 
 use crate::constants::{HEAD, NAMES};
 use std::cell::RefCell;
 use std::path::Path;
 use std::rc::Rc;
 
-/// Value of constant `kinetics` that asks for the file.
+/// Value of constant `kinetics` that selects the file.
 const IN_FILE: f64 = 3.0;
 
-/// A name, the constants that the host gives, and the whole list.
+/// Name, constants of the host, and the whole list.
 type CachedList = (String, Vec<f64>, Rc<[f64]>);
 
 thread_local! {
@@ -21,8 +21,8 @@ pub fn is_asked(list: &[f64]) -> bool {
     list.get(3) == Some(&IN_FILE)
 }
 
-/// The whole list of constants of a material: 7 to 15 from `name.umatht` in a folder, the host's name of the
-/// material in small letters, a line `growth_rate = 37869.0` (TOML) for each.
+/// Completes the constants of a material: 7 to 15 from `name.umatht` in a folder, named after the material in
+/// lower case, with a line `growth_rate = 37869.0` (TOML) for each.
 ///
 /// # Errors
 /// A file that cannot be read, a missing or unknown name, a value that is no number.
@@ -49,7 +49,7 @@ pub fn complete(folder: &Path, name: &str, list: &[f64]) -> Result<Rc<[f64]>, St
     })
 }
 
-/// Constants 7 to 15, in their order.
+/// Parses constants 7 to 15, in order.
 fn parse(text: &str) -> Result<Vec<f64>, String> {
     let table: toml::Table = text.parse().map_err(|error: toml::de::Error| error.to_string())?;
     let names = &NAMES[HEAD..];

@@ -1,4 +1,4 @@
-//! The symbols that hosts call.
+//! Symbols that hosts call.
 
 use crate::{NAMES, State, ThermalIncrement, ThermalResponse, file, respond};
 use std::ffi::{CStr, c_char, c_int};
@@ -7,10 +7,9 @@ use std::path::Path;
 /// Length of a name in Fortran.
 const NAME: usize = 80;
 
-/// UMATHT as Abaqus declares it; CalculiX appends arguments, which are left alone. `STATEV` are the first
-/// three of [`State`], and, where there is a fourth, the latent heat that crystals release per mass and time;
-/// `PROPS` are the constants of [`NAMES`]. Wrong numbers end the program with a line that names them.
-///
+/// UMATHT as Abaqus declares it; CalculiX appends arguments, which are ignored. `STATEV` holds the three of
+/// [`State`] and, if there is a fourth, the latent heat that crystals release per mass and time; `PROPS` are
+/// the constants of [`NAMES`]. Invalid numbers end the program with a message that names them.
 /// # Safety
 /// As in Fortran: every pointer is valid for the length that `NTGRD`, `NSTATV` and `NPROPS` tell, and nothing
 /// else refers to what is written.
@@ -100,14 +99,14 @@ pub unsafe extern "C" fn umatht_(
     }
 }
 
-/// A host cannot go on, and no Fortran routine returns an error.
+/// Ends the process: a host cannot continue, and no Fortran routine returns an error.
 fn end(message: &str) -> ! {
     eprintln!("{message}");
     std::process::exit(2)
 }
 
-/// `int crystfem_respond(constants, count, increment, state, answer)`: 0, or 1 where a number is out of
-/// range, which is then printed.
+/// `int crystfem_respond(constants, count, increment, state, answer)`: returns 0, or 1 if a number is out of
+/// range, with a message.
 ///
 /// # Safety
 /// `constants` points to `count` numbers, the others to what `include/crystfem.h` declares.
@@ -135,8 +134,7 @@ pub unsafe extern "C" fn crystfem_respond(
     }
 }
 
-/// `int crystfem_constant(name)`: the place of a constant by its name, counted from 0; −1 for another name.
-///
+/// `int crystfem_constant(name)`: returns the index of a constant, from 0; −1 for an unknown name.
 /// # Safety
 /// `name` points to a text that ends with 0.
 #[unsafe(no_mangle)]

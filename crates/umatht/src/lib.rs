@@ -2,7 +2,7 @@
 //! and `crystfem_respond` for C (`include/crystfem.h`).
 //!
 //! [`respond`] is the material: a pure function of constants, an increment and the state at its start. The
-//! host keeps the state; whatever increment it repeats or cuts back gets the same answer.
+//! host keeps the state; an increment that it repeats or cuts back gets the same response.
 //!
 //! ```
 //! use umatht::{ThermalIncrement, NAMES, State, respond};
@@ -27,7 +27,7 @@ use constants::HostMaterial;
 use crystfem::material::{Point, ThermalMaterial};
 use nalgebra::Vector3;
 
-/// An increment at an integration point, in the units of the host: time in s, temperature from its own zero.
+/// Increment at an integration point, in the units of the host: time in s, temperature from its own zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ThermalIncrement {
     /// Temperature at the start.
@@ -46,7 +46,7 @@ pub struct ThermalIncrement {
 pub struct State {
     /// z = \[−ln(1 − α)\]^{1/n}.
     pub z: f64,
-    /// Relative crystallinity α, to be plotted.
+    /// Relative crystallinity α, for plots.
     pub degree: f64,
     /// Absolute temperature at the end, K.
     pub temperature: f64,
@@ -56,7 +56,7 @@ pub struct State {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct ThermalResponse {
-    /// The state there.
+    /// State at the end.
     pub state: State,
     /// Change of internal energy per mass over the increment.
     pub energy: f64,
@@ -66,11 +66,11 @@ pub struct ThermalResponse {
     pub flux: [f64; 3],
     /// ∂f/∂∇T row by row, with the sign that the host expects.
     pub conductivity: [f64; 9],
-    /// Suggested next increment over this one; 1 without a wish.
+    /// Suggested ratio of the next increment to this one; 1 without a suggestion.
     pub step_ratio: f64,
 }
 
-/// The response to an increment.
+/// Computes the response to an increment.
 ///
 /// # Errors
 /// [`Error`]: a constant out of range, a temperature that is not finite or below 0 K.
@@ -81,7 +81,7 @@ pub fn respond(constants: &[f64], at: &ThermalIncrement, state: &State) -> Resul
 fn answer(constants: &HostMaterial, at: &ThermalIncrement, state: &State) -> Result<ThermalResponse, Error> {
     let HostMaterial { material, absolute_zero, calculix } = constants;
     let end = at.temperature + at.change + absolute_zero;
-    // CalculiX hands over the last iterate for the temperature at the start
+    // CalculiX passes the last iterate for the temperature at the start
     let known = *calculix && state.temperature > 0.0;
     let start = if known { state.temperature } else { at.temperature + absolute_zero };
     for kelvin in [start, end] {
@@ -119,7 +119,7 @@ mod tests {
         ThermalIncrement { temperature, change, time: 1.0, gradient: [1.0, 2.0, 3.0] }
     }
 
-    /// Own kinetics, those of column 1, with a melting point of 500 K.
+    /// Constants with own kinetics: those of column 1, with a melting point of 500 K.
     const OWN: [f64; 15] = [
         0.25,
         2200.0,
@@ -138,8 +138,8 @@ mod tests {
         500.0,
     ];
 
-    /// Crystals melt where their own constants say: at 460 K those of PA12 are gone, others are there, or
-    /// never melt.
+    /// Crystals melt at the temperature of their own constants: at 460 K those of PA12 are gone, others
+    /// remain, or never melt.
     #[test]
     fn melting_belongs_to_the_constants() {
         let hot = ThermalIncrement { gradient: [0.0; 3], ..at(440.0, 20.0) };
@@ -156,8 +156,8 @@ mod tests {
         assert_eq!(degree(&as_pa12), pa12);
     }
 
-    /// The start is that of CalculiX's state, the sign of k that of its conductivity, the zero that of the
-    /// host.
+    /// CalculiX' conventions: start from the state, sign of k in its conductivity, zero of the host's
+    /// temperature.
     #[test]
     fn hosts_differ() {
         let celsius = [0.25, 2200.0, 52e3, 1.0, 273.15, 0.0];
@@ -174,7 +174,7 @@ mod tests {
         assert_eq!(abaqus.flux, [-0.25, -0.5, -0.75]);
     }
 
-    /// ∂U/∂T by central differences, with latent heat; the energy of a way there and back at once is 0.
+    /// ∂U/∂T by central differences, with latent heat; an instantaneous round trip has no energy.
     #[test]
     fn slope_is_the_derivative() {
         let constants = [0.25, 2200.0, 52e3, 2.0];

@@ -18,7 +18,7 @@ fn library() -> &'static Path {
     BUILT.get_or_init(|| hosts::static_library("umatht"))
 }
 
-/// A program of the files, linked with the library.
+/// Builds a program from the files, linked with the library.
 fn link(compiler: &str, files: &[&Path], folder: &Path) -> PathBuf {
     let program = folder.join("host");
     let mut build = Command::new(compiler);
@@ -161,7 +161,7 @@ contains
 end program main
 ";
 
-/// A block that cools at 10 K/min in CalculiX 2.20: temperatures at which it crystallizes.
+/// Cools a block at 10 K/min in CalculiX 2.20: temperatures at which it crystallizes.
 #[test]
 fn crystallizes_in_calculix() {
     let Some(source) = hosts::calculix() else { return };

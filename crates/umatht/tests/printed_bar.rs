@@ -15,8 +15,8 @@ const HEIGHT: f64 = 0.5e-3;
 const INTERVAL: f64 = 10.0;
 /// ΔH·X∞, J/kg.
 const LATENT: f64 = 52_250.0;
-/// A layer lies on a film so thin that it neither insulates nor conducts along it: so its nodes are its own,
-/// and a birth keeps its energy.
+/// Thickness of the film under each layer, so small that it neither insulates nor conducts along it: each
+/// layer has its own nodes, and a birth conserves its energy.
 const FILM: f64 = 1e-7;
 const HALF: [f64; 2] = [2e-3, 1e-3];
 
@@ -26,7 +26,7 @@ fn bar() -> Bar {
     Bar { elements_per_layer: 4, element_size: 0.5e-3, ..Bar::new([x, y], LAYERS, HEIGHT) }
 }
 
-/// Temperatures of all nodes that exist, K, at the end of each layer.
+/// Temperatures of all existing nodes, K, at the end of each layer.
 fn ours(latent: bool) -> Vec<Vec<Option<f64>>> {
     let material = Semicrystalline::new(Polymer {
         density: 1010.0,
@@ -50,8 +50,8 @@ fn ours(latent: bool) -> Vec<Vec<Option<f64>>> {
         .collect()
 }
 
-/// The layer of an element, from 0, and the numbers of its nodes in CalculiX: a node between two layers is
-/// two.
+/// Returns the layer of an element, from 0, and the numbers of its nodes in CalculiX: a node between two
+/// layers exists twice.
 fn element(mesh: &Mesh, nodes: &[u32; 8]) -> (usize, [usize; 8]) {
     let middle = nodes.iter().map(|&node| mesh.points[node as usize][2]).sum::<f64>() / 8.0;
     let layer = (middle / HEIGHT) as usize;
@@ -105,7 +105,7 @@ fn deck(mesh: &Mesh, latent: bool) -> String {
                     next += 1;
                     let under = corners.map(|c| number(mesh, nodes[c], layer - 1));
                     let over = corners.map(|c| numbers[c]);
-                    // seen from above anticlockwise
+                    // anticlockwise as seen from above
                     let turned = |face: [usize; 4]| [face[0], face[3], face[2], face[1]];
                     writeln!(films, "{next},{}", list(&[turned(under), turned(over)].concat())).unwrap();
                 }
@@ -188,7 +188,7 @@ fn node_by_node() {
                 let numbers: Vec<f64> =
                     line.split_whitespace().filter_map(|word| word.parse().ok()).collect();
                 let [number, kelvin] = numbers[..] else { continue };
-                // upper nodes of films are not ours
+                // upper nodes of films do not exist here
                 if let Some(Some(own)) = own.get(number as usize - 1) {
                     off = off.max((own - kelvin).abs());
                     compared += 1;

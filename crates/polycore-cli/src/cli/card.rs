@@ -9,11 +9,11 @@ use polycore::file::atomic_write;
 use super::material::{BULK_RATIO, unusable};
 use super::table_fits::TableFits;
 
-/// Files by units: their name, what they say of it, and the host's unit of stress, Pa.
+/// Files by system of units: name, description, and the host's unit of stress, Pa.
 const FILES: [(&str, &str, f64); 2] =
     [("materials_mm.inp", "mm, N, MPa", 1e6), ("materials_si.inp", "m, N, Pa", 1.0)];
 
-/// `materials_mm.inp` and `materials_si.inp`: a card of every fit.
+/// Writes `materials_mm.inp` and `materials_si.inp` with a card of every fit.
 ///
 /// # Errors
 /// A file that cannot be written.
@@ -46,8 +46,8 @@ pub fn write(directory: &Path, all: &[TableFits]) -> Result<(), Error> {
     Ok(())
 }
 
-/// The card of a law with its parameters and bulk modulus, stresses in the host's unit: *HYPERELASTIC where
-/// hosts have the law, with D₁ = 2/K, or the user material of crate `umat`.
+/// Formats the card of a law with its parameters and bulk modulus, stresses in the host's unit: *HYPERELASTIC
+/// if hosts have the law, with D₁ = 2/K, or the user material of crate `umat`.
 fn card(key: &str, parameters: &[f64], bulk: f64) -> String {
     let name = key.to_uppercase().replace('-', "_");
     let compliance = 2.0 / bulk;
@@ -81,7 +81,7 @@ fn card(key: &str, parameters: &[f64], bulk: f64) -> String {
     format!("*MATERIAL, NAME={name}\n*HYPERELASTIC, {kind}\n{}", lines(&numbers))
 }
 
-/// Eight numbers a line.
+/// Formats eight numbers per line.
 fn lines(numbers: &[f64]) -> String {
     let row = |row: &[f64]| row.iter().map(|x| format!("{x:.6e}")).collect::<Vec<_>>().join(", ") + "\n";
     numbers.chunks(8).map(row).collect()
@@ -123,7 +123,7 @@ mod tests {
             let found = card(key, parameters, 40.0);
             assert!(found.ends_with(expected), "{found}");
         }
-        // a name of twelve numbers still has eight a line
+        // a name of twelve numbers still has eight per line
         assert!(
             MODELS
                 .iter()

@@ -1,4 +1,4 @@
-//! Pictures of fits: curves over the data for each kind of test in a table, and model against measurement.
+//! Pictures of fits: curves over the data for each test of a table, and model against measurement.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use polycore::constitutive::hyperelastic::{Hyperelastic, ModelKind, homogeneous}
 
 use super::MPA;
 
-/// A kind of homogeneous test that may be found among general biaxial states.
+/// Homogeneous test that may occur among general biaxial states.
 struct Test {
     key: &'static str,
     title: &'static str,
@@ -48,14 +48,14 @@ const TESTS: [Test; 3] = [
     },
 ];
 
-/// Points of a drawn curve.
+/// Number of points of a curve.
 const POINTS: usize = 200;
 
-/// The thesis' two categories have pictures of their own: together they would be more curves than colours.
+/// Categories of the thesis, each with its own pictures: together they would be more curves than colours.
 const KINDS: [(ModelKind, &str); 2] =
     [(ModelKind::Phenomenological, "phenomenological"), (ModelKind::Micromechanical, "chains")];
 
-/// `<data>_<test>_<kind>.png` for every kind of test with at least three states, and
+/// Draws `<data>_<test>_<kind>.png` for every test with at least three states, and
 /// `<data>_parity_<kind>.png` for biaxial tables.
 pub fn pictures(directory: &Path, name: &str, table: &TestData, fits: &[Fit]) -> Result<(), Error> {
     for (kind, suffix) in KINDS {
@@ -77,7 +77,7 @@ pub fn pictures(directory: &Path, name: &str, table: &TestData, fits: &[Fit]) ->
     Ok(())
 }
 
-/// Nominal stress over stretch.
+/// Draws nominal stress over stretch.
 fn curves(name: &str, test: &Test, states: &[&TestState], fits: &[&Fit]) -> LinePlot {
     let x: Vec<f64> = states.iter().map(|state| state.stretches[0]).collect();
     let y: Vec<f64> = states.iter().map(|state| state.nominal[0] / MPA).collect();
@@ -90,7 +90,7 @@ fn curves(name: &str, test: &Test, states: &[&TestState], fits: &[&Fit]) -> Line
         .y_range(least, most)
         .series(Series::markers("measured", &x, &y));
     for fit in fits {
-        // beyond locking a curve just ends
+        // beyond locking a curve ends
         let nominal: Vec<f64> = stretches
             .iter()
             .map(|l| (test.nominal)(&fit.law, *l).map_or(f64::NAN, |nominal| nominal / MPA))
@@ -100,7 +100,7 @@ fn curves(name: &str, test: &Test, states: &[&TestState], fits: &[&Fit]) -> Line
     plot
 }
 
-/// Every stress of the table, model over measurement.
+/// Draws every stress of the table, model over measurement.
 fn parity(name: &str, table: &TestData, fits: &[&Fit]) -> Result<LinePlot, Error> {
     let measured: Vec<f64> = table
         .states
@@ -123,7 +123,7 @@ fn parity(name: &str, table: &TestData, fits: &[&Fit]) -> Result<LinePlot, Error
     Ok(plot)
 }
 
-/// Least and largest of some values and of that at rest.
+/// Least and largest of some values, the value at rest included.
 fn span(values: &[f64], rest: f64) -> [f64; 2] {
     values.iter().fold([rest, rest], |[low, high], value| [value.min(low), value.max(high)])
 }

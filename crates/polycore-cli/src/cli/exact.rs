@@ -7,15 +7,15 @@ use polycore::units::Stress;
 
 use super::MPA;
 
-/// `polycore exact eight-chain "0.27 MPa" 25 --to 4`
+/// Arguments of `polycore exact eight-chain "0.27 MPa" 25 --to 4`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// The law: neo-hookean, mooney-rivlin, gent, ogden-1, ogden-2, ogden-3, three-chain, eight-chain, …
+    /// Law: neo-hookean, mooney-rivlin, gent, ogden-1, ogden-2, ogden-3, three-chain, eight-chain, …
     law: String,
     /// Parameters in order, stresses with their unit ("0.27 MPa"); μ of Ogden in Abaqus' convention.
     #[arg(required = true, allow_negative_numbers = true)]
     parameters: Vec<String>,
-    /// The test.
+    /// Test.
     #[arg(long, value_enum, default_value = "uniaxial")]
     mode: StretchMode,
     /// First stretch.
@@ -36,7 +36,7 @@ enum StretchMode {
     PureShear,
 }
 
-/// CSV text.
+/// Computes the table as CSV text.
 pub fn table(arguments: &Arguments) -> Result<String, String> {
     let law = law(arguments)?;
     let mut text = String::from("stretch_1,stretch_2,nominal_1_MPa,nominal_2_MPa\n");

@@ -1,4 +1,4 @@
-//! Runs the fits and trials of a case and writes what they give.
+//! Runs the fits and trials of a case and writes the results.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -21,8 +21,8 @@ use super::scene::{DataSet, FitCase};
 use super::table_fits::{TableFits, unit_of};
 use super::{card, draw, material, trials};
 
-/// Fits every law to every table, writes tables and pictures. A law that cannot be fitted is named; the
-/// others are kept. Where it is stopped, what is done is written.
+/// Fits every law to every table; writes tables and pictures. A law that cannot be fitted is reported, the
+/// others are kept. If the run is stopped, finished fits are written.
 pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
     let (directory, quick) = (run.options.output, run.options.quick);
     run.begin()?;
@@ -104,7 +104,8 @@ fn scaled(value: f64, unit: &str) -> (f64, &'static str) {
     if unit == "Pa" { (value / MPA, "MPa") } else { (value, "") }
 }
 
-/// rms, mean absolute error and R² of a law on another table than that of its fit; where it locks, how often.
+/// Records rms, mean absolute error and R² of a law on another table than that of its fit; if it locks there,
+/// how often.
 fn judge_on(
     report: &mut Report,
     key: &str,
@@ -160,8 +161,8 @@ fn unstable(fit: &Fit, table: &TestData) -> Option<(Mode, f64)> {
         .find_map(|(mode, end)| stability::unstable_from(&fit.law, mode, end).map(|stretch| (mode, stretch)))
 }
 
-/// `fits.csv`: one line for each number, with its standard error where the data determine it; stresses of a
-/// table in one unit.
+/// Writes `fits.csv`: one line for each number, with its standard error if the data determine it; stresses of
+/// a table in one unit.
 fn write_fits(directory: &Path, all: &[TableFits]) -> Result<(), Error> {
     let mut text = String::from("data,law,quantity,value,standard_error,unit\n");
     for set in all {
@@ -197,7 +198,7 @@ fn write_fits(directory: &Path, all: &[TableFits]) -> Result<(), Error> {
     })
 }
 
-/// `<data>_<law>_posterior.csv`: draws of the parameters, for `sweep --sample`.
+/// Writes `<data>_<law>_posterior.csv`: draws of the parameters, for `sweep --sample`.
 fn write_draws(directory: &Path, name: &str, fit: &Fit) -> Result<(), Error> {
     if fit.draws.is_empty() {
         return Ok(());
@@ -212,7 +213,7 @@ fn write_draws(directory: &Path, name: &str, fit: &Fit) -> Result<(), Error> {
     output::csv::write(directory.join(format!("{name}_{}_posterior.csv", fit.model.key)), &columns)
 }
 
-/// `<data>_states.csv`: the measured states, and beside them what every law makes of them.
+/// Writes `<data>_states.csv`: the measured states, and beside them the predictions of every law.
 fn write_states(directory: &Path, name: &str, table: &TestData, fits: &[Fit]) -> Result<(), Error> {
     let mut columns: Vec<(String, &str, Vec<f64>)> = Vec::new();
     for i in [0, 1] {
@@ -296,10 +297,10 @@ fn summary(case: &FitCase, all: &[TableFits], report: &Report) -> String {
     text
 }
 
-/// R² in the own and in other tables below which a law is not to be used there.
+/// R² in the own and in other tables below which a law is unsafe there.
 const SAFE: f64 = 0.9;
 
-/// R² of each law in its table and in the others, whether it may be used there, and where it is unstable.
+/// Lists R² of each law in its table and in the others, whether it is safe there, and where it is unstable.
 fn verdicts(set: &TableFits) -> String {
     let [low, high] = stability::range(set.table);
     let mut text = format!(
@@ -340,7 +341,7 @@ fn verdicts(set: &TableFits) -> String {
     text
 }
 
-/// `links 25.46 ± 0.13`.
+/// Formats a parameter: `links 25.46 ± 0.13`.
 fn shown(parameter: &FittedParameter) -> String {
     let name = parameter.name;
     let (unit, scale) = if parameter.unit == "Pa" { unit_of(parameter.value) } else { ("", 1.0) };

@@ -10,17 +10,17 @@ use polycore::file::atomic_write;
 
 use super::table_fits::{TableFits, unit_of};
 
-/// Laws of which the printed block is taken before others.
+/// Laws whose block is printed in preference to others.
 const EIGHT_CHAINS: &str = "eight-chain";
 
-/// Bulk over shear modulus: nearly incompressible. Tests at constant volume do not determine it.
+/// Ratio of bulk to shear modulus: nearly incompressible. Tests at constant volume do not determine it.
 pub const BULK_RATIO: f64 = 100.0;
 
-/// Standard errors to either side of a value that hold 95 % of a normal distribution.
+/// Number of standard errors to either side of a value that hold 95 % of a normal distribution.
 const HALF_WIDTH: f64 = 1.96;
 
-/// `[material.solid]` of `peri` for a fitted law: the law itself, with its intervals of confidence. Of a law
-/// that the data do not determine, in comments, what to take.
+/// Formats `[material.solid]` of `peri` for a fitted law, with its confidence intervals. For a law that the
+/// data do not determine it is a comment with advice.
 fn block(fit: &Fit) -> String {
     let rms = stress(fit.rms, 5);
     if let Some(why) = unusable(fit) {
@@ -57,7 +57,7 @@ fn block(fit: &Fit) -> String {
     text
 }
 
-/// Why a fitted law is no material to use, and what to take.
+/// Returns the reason for which a fitted law is no usable material, with advice.
 pub fn unusable(fit: &Fit) -> Option<String> {
     let names = |standing| -> Vec<&str> {
         let those = fit.parameters.iter().filter(|parameter| parameter.identifiability == identifiability);
@@ -75,8 +75,8 @@ pub fn unusable(fit: &Fit) -> Option<String> {
     })
 }
 
-/// The block of the eight-chain law with the least rms; without such a one, of the best law. Laws of which
-/// every parameter is known to half of its size come first.
+/// Formats the block of the eight-chain law with the least rms or, without such a law, of the best law. Laws
+/// whose parameters are all known to half of their size come first.
 pub fn best(data: &str, fits: &[Fit]) -> String {
     let known = |fit: &Fit| {
         let sure = |parameter: &FittedParameter| {
@@ -93,7 +93,7 @@ pub fn best(data: &str, fits: &[Fit]) -> String {
     best.map_or_else(String::new, |fit| format!("for a scene of peri, from {data}:\n{}", block(fit)))
 }
 
-/// `materials.toml`: the block of every fit, under comments.
+/// Writes `materials.toml`: the block of every fit, under comments.
 pub fn write(directory: &Path, all: &[TableFits]) -> Result<(), Error> {
     atomic_write(directory.join("materials.toml"), |file| {
         writeln!(file, "# Take one block: docs/guide/src/how-to/fit.md says what it can and cannot do.")?;
@@ -106,7 +106,7 @@ pub fn write(directory: &Path, all: &[TableFits]) -> Result<(), Error> {
     })
 }
 
-/// Significant digits of parameters.
+/// Number of significant digits of parameters.
 pub const DIGITS: usize = 7;
 
 /// Formats a stress with its unit.
@@ -115,7 +115,7 @@ pub fn stress(value: f64, significant: usize) -> String {
     format!("{} {unit}", digits(value / scale, significant))
 }
 
-/// A number with so many significant digits.
+/// Formats a number with so many significant digits.
 pub fn digits(value: f64, significant: usize) -> String {
     let exponent = if value == 0.0 { 0 } else { value.abs().log10().floor() as i32 };
     let after = significant as i32 - 1 - exponent;

@@ -1,4 +1,4 @@
-//! The scalars that reports of `polycore` can have.
+//! Scalars in reports of `polycore`.
 
 harness::quantities! {
     /// Quantities of fits, `{fit}` = DATA.LAW or, for a fit judged on other data, DATA.LAW.OTHER; and of

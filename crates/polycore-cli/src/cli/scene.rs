@@ -1,4 +1,4 @@
-//! The scene of fits and trials: which laws, which data, trials, expectations.
+//! Scenes of fits and trials: laws, data, trials, expectations.
 
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -15,7 +15,7 @@ use serde::Deserialize;
 use super::quantities as q;
 use super::trials::FitTrial;
 
-/// The file as written.
+/// Scene as written in the file.
 #[derive(Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Scene {
@@ -28,7 +28,7 @@ struct Scene {
     /// Fits.
     #[serde(default)]
     fit: FitSettings,
-    /// Laws at single states and fits to a few, with their expected behaviour.
+    /// Laws at single states and fits to a few states, with their expected behaviour.
     #[serde(default)]
     trial: Vec<FitTrial>,
     /// Expected results.
@@ -36,7 +36,7 @@ struct Scene {
     expect: Vec<Expect>,
 }
 
-/// The program that runs these scenes; `cargo xtask validate` chooses by it.
+/// Program that runs these scenes; `cargo xtask validate` selects by it.
 #[derive(Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 enum Program {
@@ -47,7 +47,7 @@ enum Program {
 #[derive(Default, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct FitSettings {
-    /// Names of laws; all of them if not given.
+    /// Names of laws; all laws if not given.
     laws: Option<Vec<String>>,
     /// Judge a law fitted to one table on the other tables, too.
     #[serde(default)]
@@ -57,29 +57,29 @@ struct FitSettings {
     data: Vec<TestTableSpec>,
 }
 
-/// A table of homogeneous states.
+/// Table of homogeneous states.
 #[derive(Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct TestTableSpec {
     /// Name in the report.
     name: String,
-    /// The CSV file, relative to the scene.
+    /// CSV file, relative to the scene.
     file: PathBuf,
-    /// Only the states of this test; of a table without a column of tests, the test of all its states.
+    /// Test whose states are used; for a table without a column of tests, the test of all states.
     mode: Option<Mode>,
-    /// Measure of the strain where its heading leaves it open.
+    /// Measure of the strain, if its heading does not name it.
     strain: Option<StrainMeasure>,
-    /// Measure of the stress where its heading leaves it open.
+    /// Measure of the stress, if its heading does not name it.
     stress: Option<TestStressMeasure>,
     /// Unit of a stress whose heading has none: `MPa`.
     stress_unit: Option<String>,
-    /// Heading of the strain, of several.
+    /// Heading of the strain, if there are several.
     strain_column: Option<String>,
-    /// Heading of the stress, of several.
+    /// Heading of the stress, if there are several.
     stress_column: Option<String>,
 }
 
-/// A table to be fitted.
+/// Table to be fitted.
 pub struct DataSet {
     pub name: String,
     pub table: TestData,
@@ -87,12 +87,12 @@ pub struct DataSet {
     pub read: Vec<String>,
 }
 
-/// The JSON Schema of scenes.
+/// JSON Schema of scenes.
 pub fn schema() -> serde_json::Value {
     harness::scene::schema("polycore", &[q::ALL], |generator| vec![generator.subschema_for::<Scene>()])
 }
 
-/// A scene that was checked, with its data.
+/// Checked scene with its data.
 pub struct FitCase {
     pub source: Source,
     pub title: String,
@@ -193,7 +193,7 @@ impl FitCase {
         text
     }
 
-    /// Names of all scalars that the report will have.
+    /// Lists the names of all scalars of the report.
     fn quantities(&self) -> Vec<String> {
         let mut names = Vec::new();
         for DataSet { name: data, .. } in &self.data {

@@ -23,30 +23,30 @@ pub struct FitTrial {
     name: String,
     /// Expected behaviour, in words.
     description: String,
-    /// The law's name.
+    /// Name of the law.
     law: String,
     /// Parameters, in the order of the law.
     parameters: Option<Vec<ParameterValue>>,
-    /// The test.
+    /// Test.
     #[serde(default = "uniaxial")]
     mode: Mode,
     /// First stretch.
     stretch: Option<f64>,
-    /// λ of Lamé of a quadratic volumetric term, with the incompressible law's stress where it is not given.
+    /// Lamé's λ of a quadratic volumetric term; without it, the stress of the incompressible law.
     bulk: Option<Stress>,
-    /// λ₁ and P₁ of states in that mode.
+    /// Pairs of λ₁ and P₁, states of the test.
     data: Option<Vec<(f64, Stress)>>,
     /// Part of the expected error message.
     refused: Option<String>,
 }
 
-/// A parameter: a stress with its unit, or a number.
+/// Parameter: a stress with its unit, or a number.
 #[derive(Deserialize, schemars::JsonSchema)]
 #[serde(untagged)]
 enum ParameterValue {
-    /// Number with its unit.
+    /// Stress with its unit.
     Stress(Stress),
-    /// Without.
+    /// Number without a unit.
     Plain(f64),
 }
 
@@ -70,7 +70,7 @@ enum TrialResult {
 }
 
 impl FitTrial {
-    /// Names of the scalars that it may have.
+    /// Names of the scalars that the trial may have.
     pub fn quantities(&self) -> Vec<String> {
         let parameters = model(&self.law).map_or(&[][..], |model| model.parameters);
         let fixed = [q::NOMINAL, q::ENERGY, q::REFUSED, q::RMS, q::SHEAR_MODULUS];
@@ -105,10 +105,10 @@ impl FitTrial {
     }
 }
 
-/// Rules of the list.
+/// Checks the rules of the list.
 ///
 /// # Errors
-/// What is wrong and where.
+/// The rule that is broken, and its place.
 pub fn check(source: &Source, trials: &[FitTrial]) -> Result<(), SceneError> {
     for (i, trial) in trials.iter().enumerate() {
         let key = |field: &str| format!("trial[{i}].{field}");
@@ -209,7 +209,7 @@ pub fn run(trial: &FitTrial, report: &mut Report) -> Result<(), Error> {
     Ok(())
 }
 
-/// A trial fails with any expectation on it.
+/// Marks a trial as failed if any expectation on it fails.
 pub fn judge(trials: &[FitTrial], report: &mut Report) {
     for (trial, seen) in trials.iter().zip(&mut report.trials) {
         let own = trial.quantities();

@@ -58,7 +58,7 @@ pub trait Law: Send + Sync {
     }
 
     /// Bulk and shear modulus of the tangent at C = 1, for a law without stress there: Voigt's averages over
-    /// all all directions (Proc. of Hill 1952, doi:10.1088/0370-1298/65/5/307, Eq. 4–5), exact for an
+    /// all directions (Proc. of Hill 1952, doi:10.1088/0370-1298/65/5/307, Eq. 4–5), exact for an
     /// isotropic law.
     ///
     /// # Errors

@@ -100,7 +100,7 @@ impl Agreement {
 ///
 /// # Errors
 /// [`Error::Data`] if the table has fewer measurements than the law has parameters, or a mean stiffness below
-/// mean stiffness below zero; [`Error::NoConvergence`] if no start converges.
+/// zero; [`Error::NoConvergence`] if no start converges.
 pub fn fit(model: &'static ModelDescriptor, table: &TestData) -> Result<Fit, Error> {
     fit_until(model, table, &|| false)
 }

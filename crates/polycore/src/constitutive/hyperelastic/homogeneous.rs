@@ -171,7 +171,7 @@ mod tests {
         assert!(incompressible(f64::NAN, 1.0).is_err());
     }
 
-    /// With its pressure an incompressible law has the stress of the tension test: S from W plus −pJC⁻¹ with
+    /// An incompressible law with its pressure has the stress of the tension test: S from W plus −pJC⁻¹ with
     /// S₃₃ = 0.
     #[test]
     fn pressure_closes_the_incompressible_laws() {
