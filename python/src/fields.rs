@@ -26,7 +26,7 @@ pub fn layout(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyDict>> {
     Ok(found)
 }
 
-/// An array at some steps, (steps, places, components), or (steps, places) of scalars: of `point`s, of
+/// Reads an array at some steps, (steps, places, components), or (steps, places) for scalars: of `point`s, of
 /// `cell`s, or the `position`s.
 #[pyfunction]
 pub fn field<'py>(

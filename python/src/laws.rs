@@ -19,10 +19,10 @@ use std::sync::atomic::Ordering;
 /// Least number of values that are distributed to threads.
 const MANY: usize = 1 << 14;
 
-/// Numbers that a thread takes at once.
+/// Number of values that a thread computes at once.
 const CHUNK: usize = 1 << 12;
 
-/// A function of Langevin statistics at each number; `method` is the inverse.
+/// Evaluates a function of Langevin statistics at each number; `method` is the inverse.
 #[pyfunction]
 pub fn langevin<'py>(
     py: Python<'py>,
@@ -54,7 +54,7 @@ fn each(x: &[f64], function: impl Fn(f64) -> f64 + Sync) -> Vec<f64> {
     x.par_iter().with_min_len(CHUNK).map(|&x| function(x)).collect()
 }
 
-/// Name, source and published error, in per cent, of each inverse.
+/// Lists name, source and published error, in per cent, of each inverse.
 #[pyfunction]
 pub fn langevin_methods() -> Vec<(&'static str, &'static str, Option<&'static str>)> {
     Inverse::ALL.iter().map(|one| (one.name(), one.source(), one.published_error())).collect()
@@ -63,7 +63,7 @@ pub fn langevin_methods() -> Vec<(&'static str, &'static str, Option<&'static st
 /// Name, unit and example value.
 type ParameterRow = (&'static str, &'static str, f64);
 
-/// Name of each law, and name, unit and example value of each of its parameters.
+/// Lists each law, with name, unit and example value of each of its parameters.
 #[pyfunction]
 pub fn models() -> Vec<(&'static str, Vec<ParameterRow>)> {
     let parameters = |model: &hyperelastic::ModelDescriptor| {
@@ -72,7 +72,7 @@ pub fn models() -> Vec<(&'static str, Vec<ParameterRow>)> {
     MODELS.iter().map(|model| (model.key, parameters(model))).collect()
 }
 
-/// A hyperelastic law of Chapter 1.
+/// Hyperelastic law of Chapter 1.
 #[pyclass(frozen, module = "polymech._polymech")]
 pub struct Law {
     key: String,
@@ -134,7 +134,7 @@ impl Law {
         self.law.shear_modulus()
     }
 
-    /// Nominal stresses P₁, P₂, (N, 2), of an incompressible sheet stretched to λ₁, λ₂.
+    /// Computes nominal stresses P₁, P₂, (N, 2), of an incompressible sheet stretched to λ₁, λ₂.
     fn biaxial<'py>(
         &self,
         py: Python<'py>,
@@ -149,7 +149,7 @@ impl Law {
         found.into_iter().flatten().collect::<Vec<_>>().into_pyarray(py).reshape([count, 2])
     }
 
-    /// W, (N, 1), P, σ or S, (N, 9), at each F, (N, 9).
+    /// Computes W, (N, 1), P, σ or S, (N, 9), at each F, (N, 9).
     fn of_gradient<'py>(
         &self,
         py: Python<'py>,
@@ -189,7 +189,7 @@ impl Law {
     }
 }
 
-/// Evaluates a function at `count` points, on all threads where there are many; returns the first error.
+/// Evaluates a function at `count` points, on all threads if there are many; returns the first error.
 fn points<T: Send>(
     py: Python<'_>,
     count: usize,
@@ -206,8 +206,7 @@ fn points<T: Send>(
     found.map_err(value)
 }
 
-/// The best fit of a law to nominal stresses: P₁ at λ₁ of a `mode`, or (P₁, P₂) at (λ₁, λ₂) of `biaxial`
-/// rows.
+/// Fits a law to nominal stresses: P₁ at λ₁ of a `mode`, or (P₁, P₂) at (λ₁, λ₂) of `biaxial` rows.
 #[pyfunction]
 pub fn fit_law<'py>(
     py: Python<'py>,

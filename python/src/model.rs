@@ -1,4 +1,4 @@
-//! Models of `peri` in a few lines of Python.
+//! Models of `peri`, described in a few lines of Python.
 
 use crate::bond::BondLaw;
 use crate::error::{fault, value};
@@ -22,16 +22,17 @@ use std::collections::HashMap;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
-/// A function of all positions, (N, D); displacement and body force of the points that it takes.
+/// Prescribed region: a function that selects positions, (N, D); displacement and body force of the selected
+/// points.
 type PrescribedRegion = (Py<PyAny>, Vec<Option<f64>>, Vec<f64>);
 
-/// A model as Python describes it; lengths in m.
+/// Model as described in Python; lengths in m.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct SimulationSpec {
-    /// `add` or `cut`, the kind, its numbers.
+    /// `add` or `cut`, the shape, its numbers.
     shapes: Vec<(String, String, Vec<f64>)>,
-    /// Two ends in a plane; in space a corner and two edges.
+    /// Two ends of a crack in a plane; in space a corner and two edges.
     cracks: Vec<Vec<f64>>,
     spacing: f64,
     horizon: f64,
@@ -51,7 +52,7 @@ pub struct SimulationSpec {
     contact: Option<f64>,
 }
 
-/// Method and settings.
+/// Solution method with its settings.
 #[derive(Clone, Copy)]
 enum SolverChoice {
     Lbfgs(Lbfgs),
@@ -59,7 +60,7 @@ enum SolverChoice {
     Verlet(VelocityVerlet),
 }
 
-/// A body in the plane or in space.
+/// Body in the plane or in space.
 trait AnyBody: Send + Sync {
     fn dimension(&self) -> usize;
     fn solve(&mut self, method: SolverChoice, line: &RunLink<'_>) -> Result<(), Error>;
@@ -155,7 +156,7 @@ impl<const D: usize> AnyBody for BondSimulation<D> {
     }
 }
 
-/// A model that is built: particles, bonds and state.
+/// Model with particles, bonds and state.
 #[pyclass(module = "polymech._polymech")]
 pub struct Simulation {
     body: Box<dyn AnyBody>,
@@ -171,7 +172,7 @@ impl Simulation {
             Err(_) => None,
         };
         let named = if sampled.is_none() { Some(spec.law.extract::<String>(py)?) } else { None };
-        // what a region of Python raised
+        // an exception of a region's function
         let raised = Arc::new(Mutex::new(None));
         let built = py.detach(|| match spec.space.as_str() {
             "solid" => build::<3>(spec, sampled, named, &raised),
@@ -184,7 +185,7 @@ impl Simulation {
         Ok(Self { whole: body.intact(), body })
     }
 
-    /// Solves what is left of the load steps; `False` where `on_step` stopped it.
+    /// Solves the remaining load steps; returns `False` if `on_step` stopped it.
     #[pyo3(signature = (method, settings, threads, on_step))]
     fn solve(
         &mut self,
@@ -227,7 +228,7 @@ impl Simulation {
         self.vectors(py, self.body.displacements())
     }
 
-    /// Name and unit of each column, and its values, a row for each step.
+    /// Returns name and unit of each column, and its values, a row for each step.
     fn history<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let columns = PyDict::new(py);
         for (name, unit, values) in self.body.history() {
@@ -236,7 +237,7 @@ impl Simulation {
         Ok(columns)
     }
 
-    /// `cauchy` or `piola` stress, Pa, or the `deformation` gradient, (N, D, D).
+    /// Computes `cauchy` or `piola` stress, Pa, or the `deformation` gradient, (N, D, D).
     fn tensors<'py>(
         &self,
         py: Python<'py>,
@@ -254,7 +255,7 @@ impl Simulation {
         found.into_pyarray(py).reshape(vec![count, d, d])
     }
 
-    /// The part of its bonds that each particle has lost.
+    /// Share of its bonds that each particle has lost.
     fn damage<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let now = self.body.intact();
         let lost =
@@ -275,7 +276,7 @@ impl Simulation {
     }
 }
 
-/// A shape of a kind and numbers.
+/// Creates a shape from its name and numbers.
 fn shape<const D: usize>(kind: &str, numbers: &[f64]) -> PyResult<Shape<D>> {
     let vector = |from: usize| -> [f64; D] { std::array::from_fn(|d| numbers[from + d]) };
     match (kind, numbers.len()) {
@@ -383,7 +384,7 @@ fn cut<const D: usize>(numbers: &[f64]) -> PyResult<Cut<D>> {
         return Err(value(format!("crack: found {} numbers; allowed: {}", numbers.len(), D * D)));
     }
     let vector = |from: usize| -> [f64; D] { std::array::from_fn(|d| numbers[from + d]) };
-    // in a plane its other end, in space its edges
+    // the other end in a plane, the edges in space
     let edge = |k: usize| match D {
         2 if k == 0 => std::array::from_fn(|d| numbers[2 + d] - numbers[d]),
         2 => [0.0; D],
@@ -393,7 +394,7 @@ fn cut<const D: usize>(numbers: &[f64]) -> PyResult<Cut<D>> {
     Ok(Cut { corner: vector(0), edges: std::array::from_fn(edge) })
 }
 
-/// The space of a body.
+/// Bodies of one dimension, placed in plane stress, plane strain or space.
 trait InSpace: Sized {
     fn in_space(self, space: &str, thickness: f64) -> PyResult<Self>;
 }
@@ -414,7 +415,7 @@ impl InSpace for Body<3> {
     }
 }
 
-/// A method by its name, with some of its settings.
+/// Creates a method from its name and some of its settings.
 fn solver(name: &str, mut settings: HashMap<String, f64>) -> PyResult<SolverChoice> {
     let mut take = |name: &str, default: f64| settings.remove(name).unwrap_or(default);
     let method = match name {

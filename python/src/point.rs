@@ -1,4 +1,4 @@
-//! The material of a print at a point, and its kinetics fitted.
+//! Material of a print at a point, and fits of its kinetics.
 
 use crate::error::fault;
 use crate::watch::left_alone;
@@ -12,12 +12,12 @@ use numpy::{IntoPyArray, PyArray2, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// A polymer as Python describes it, SI.
+/// Polymer as described in Python, SI.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct MaterialPointSpec {
     density: f64,
-    /// Temperatures, K, none of a constant, and values.
+    /// Temperatures, K (none for a constant), and values.
     conductivity: (Vec<f64>, Vec<f64>),
     specific_heat: (Vec<f64>, Vec<f64>),
     /// K₀, K_G, U, T₀, T∞, n.
@@ -59,8 +59,8 @@ impl MaterialPointSpec {
     }
 }
 
-/// The material under a temperature history (s, K): columns `time`, `temperature`, `energy`, `rate` and its
-/// fields.
+/// Computes the material under a temperature history (s, K): columns `time`, `temperature`, `energy`, `rate`
+/// and its fields.
 #[pyfunction]
 pub fn course<'py>(
     py: Python<'py>,

@@ -1,4 +1,4 @@
-//! A law at many points: flat arrays in, flat arrays out, on all threads and without the interpreter's lock.
+//! Laws at many points: flat arrays in, flat arrays out, on all threads and without the interpreter's lock.
 
 use crate::watch::stoppable;
 use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray2};
@@ -10,13 +10,13 @@ use pyo3::types::PyDict;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Points that a thread takes at once.
+/// Number of points that a thread computes at once.
 const CHUNK: usize = 256;
 
-/// Places of the six components among the nine of a tensor, rows first.
+/// Indices of the six components among the nine of a tensor, row by row.
 const UPPER: [usize; 6] = [0, 4, 8, 1, 2, 5];
 
-/// And those of their mirror images.
+/// Indices of their mirror images.
 const LOWER: [usize; 6] = [0, 4, 8, 3, 6, 7];
 
 /// Options of a prediction at rows of `width` numbers.
@@ -25,7 +25,7 @@ struct PredictOptions {
     width: usize,
     tangent: bool,
     uncertainty: bool,
-    /// Two entries of C may differ by this part of its largest.
+    /// Allowed asymmetry of C, relative to its largest entry.
     rounding: f64,
 }
 
@@ -37,7 +37,7 @@ struct Predicted {
     energy: Vec<f64>,
     spread: Vec<f64>,
     deviation: Vec<f64>,
-    /// 8 for each point: six components outside, far, spread.
+    /// Eight flags per point: six components outside, far, spread.
     flags: Vec<bool>,
     unseen: Vec<bool>,
 }
@@ -58,9 +58,9 @@ struct UncertaintyChunk<'a> {
     unseen: &'a mut [bool],
 }
 
-/// `stress` (N, 6) in Pa, `tangent` (N, 6, 6) in Pa if asked for, `energy` (N) in J/m³ (NaN of a law
-/// without), and of a learnt law `spread` (N), `deviation` (N, 6), `outside` and `unseen` (N, 6), `far`,
-/// `disagree` (N), at the rows of C, (N, 6) or (N, 9). A C of nine is taken for symmetric where it is within
+/// Predicts `stress` (N, 6) in Pa, `tangent` (N, 6, 6) in Pa if requested, `energy` (N) in J/m³ (NaN for a
+/// law without), and for a learnt law `spread` (N), `deviation` (N, 6), `outside` and `unseen` (N, 6), `far`,
+/// `disagree` (N), at the rows of C, (N, 6) or (N, 9). A C of nine components counts as symmetric within
 /// `rounding` of its largest entry.
 pub fn predict<'py>(
     py: Python<'py>,
@@ -155,7 +155,7 @@ fn evaluate(
 }
 
 impl OutputChunk<'_> {
-    /// Evaluates the points; the first that the law refuses, and why.
+    /// Evaluates the points; returns the first error and its point.
     fn fill(
         &mut self,
         law: &dyn Law,
@@ -188,7 +188,7 @@ impl OutputChunk<'_> {
                 *prediction = law.tangent(c, memory).map_err(|error| told(point, error))?;
             }
         } else if law.stresses(points, memory, predictions).is_err() {
-            // one by one: which of them it is
+            // one by one, to find the point of the error
             for (point, (c, prediction)) in points.iter().zip(predictions.iter_mut()).enumerate() {
                 *prediction = law.stress(c, memory).map_err(|error| told(point, error))?;
             }

@@ -1,4 +1,4 @@
-//! Scenes, run as the command lines run them.
+//! Runs of scenes, as on the command lines.
 
 use crate::error::failure;
 use crate::watch::{RunLink, Watchers, left_alone, watched};
@@ -50,7 +50,7 @@ impl RunOptions {
     }
 }
 
-/// Runs a scene into a folder: the text of `report.json` and what the command line prints of it.
+/// Runs a scene into a folder; returns the text of `report.json` and the terminal output.
 #[pyfunction]
 pub fn run(
     py: Python<'_>,
@@ -62,7 +62,7 @@ pub fn run(
     of_program!(program, run_of(py, Source::new(path, text), how, false))
 }
 
-/// Continues a run that was stopped; of a finished one its report.
+/// Resumes a stopped run; for a finished run, returns its report.
 #[pyfunction]
 pub fn resume(py: Python<'_>, program: &str, how: RunOptions) -> PyResult<(String, String)> {
     of_program!(program, resume_of(py, how))
@@ -199,7 +199,7 @@ fn sweep_of<C: Case>(
     told(&finished.map_err(|error| failure(py, error, output))?)
 }
 
-/// The JSON Schema of a program's scenes.
+/// Returns the JSON Schema of a program's scenes.
 #[pyfunction]
 pub fn schema(program: &str) -> PyResult<String> {
     fn of<C: Case>() -> PyResult<String>
@@ -211,7 +211,7 @@ pub fn schema(program: &str) -> PyResult<String> {
     of_program!(program, of())
 }
 
-/// The page of a run in a folder, as HTML.
+/// Creates the page of a run in a folder, as HTML.
 #[pyfunction]
 pub fn view(py: Python<'_>, folder: PathBuf) -> PyResult<String> {
     py.detach(|| harness::view::view(folder)).map_err(|error| crate::error::file(&error))

@@ -1,4 +1,4 @@
-//! Laws learnt from data.
+//! Learnt laws.
 
 use crate::error::{file, value};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use std::path::PathBuf;
 
-/// A law C → S, or W, as `mdsurrogate` writes it.
+/// Law C → S, or W, as `mdsurrogate` writes it.
 #[pyclass(frozen, name = "Surrogate", module = "polymech._polymech")]
 pub struct LearntLaw {
     law: surrogate::Surrogate,
@@ -52,12 +52,12 @@ impl LearntLaw {
         Ok((PyBytes::new(py, &self.law.to_bytes().map_err(value)?),))
     }
 
-    /// All but the weights, as JSON.
+    /// Returns everything but the weights, as JSON.
     fn header(&self) -> PyResult<String> {
         serde_json::to_string(self.law.header()).map_err(value)
     }
 
-    /// W and b of each layer of each member.
+    /// Returns W and b of each layer of each member.
     fn weights<'py>(&self, py: Python<'py>) -> PyResult<Vec<MemberWeights<'py>>> {
         let of_layer = |layer: &Layer<f64>| {
             let outputs = layer.bias.len();

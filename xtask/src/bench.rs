@@ -27,9 +27,9 @@ mod surrogate;
 /// Options of `bench`.
 #[derive(clap::Args)]
 pub struct Options {
-    /// `langevin`, `peri-laws`, `peri-peers` (beside LAMMPS), `peri-solvers [-- MM,MM…]`,
-    /// `crystfem [-- PART… N,N…]` (its brick beside CalculiX and scikit-fem), `mdsurrogate` (its training and
-    /// answers beside PyTorch and onnxruntime), or a crate with a `benches/measure.rs`.
+    /// Bench: `langevin`, `peri-laws`, `peri-peers` (compared with LAMMPS), `peri-solvers [-- MM,MM…]`,
+    /// `crystfem [-- PART… N,N…]` (its brick compared with CalculiX and scikit-fem), `mdsurrogate` (training
+    /// and inference compared with PyTorch and onnxruntime), or a crate with a `benches/measure.rs`.
     name: String,
     /// Print the rows as JSON.
     #[arg(long)]
@@ -54,7 +54,7 @@ pub fn read(workspace: &Repository, name: &str) -> Option<Bench> {
     serde_json::from_str(&text).ok()
 }
 
-/// Measures, prints and writes.
+/// Measures, prints and writes the rows.
 pub fn run(workspace: &Repository, options: &Options) -> Result<bool> {
     let folder = workspace.results("bench")?;
     let (rows, table, passed) = match options.name.as_str() {
@@ -96,7 +96,7 @@ pub fn run(workspace: &Repository, options: &Options) -> Result<bool> {
             (rows, table, true)
         }
     };
-    // a part with options of its own is not what the report shows
+    // a part with other options is not what the report shows
     if options.name == "crystfem" {
         print(&if options.json {
             serde_json::to_string_pretty(&rows).into_diagnostic()? + "\n"
@@ -152,7 +152,7 @@ fn write(workspace: &Repository, name: &str, rows: &[Row]) -> Result<PathBuf> {
     let path = workspace.results("bench")?.join(format!("{name}.json"));
     let of = name.split('-').next().unwrap_or(name);
     let crates = workspace.programs();
-    // `langevin` is of no program: the numerics of `polycore`
+    // `langevin` belongs to no program: the numerics of `polycore`
     let measured: Vec<&str> = crates.iter().map(String::as_str).filter(|program| *program == of).collect();
     let stamp =
         SourceStamp::new(workspace.root(), &sources(workspace.root(), &measured, &["src", "benches"]))?;

@@ -15,7 +15,7 @@ use crate::workspace::Repository;
 
 /// Files of the tree that an archive contains.
 const FILES: [&str; 5] = ["README.md", "CHANGELOG.md", "CITATION.cff", "LICENSE-APACHE", "LICENSE-MIT"];
-/// Shells and what their completions are called.
+/// Shells and the names of their completions.
 const SHELLS: [(&str, &str, &str); 5] = [
     ("bash", "", ""),
     ("zsh", "_", ""),
@@ -38,7 +38,7 @@ pub struct Options {
     target: Option<String>,
 }
 
-/// Writes `polymer-mechanics-VERSION-TRIPLE.tar.gz` and says where it is.
+/// Writes `polymer-mechanics-VERSION-TRIPLE.tar.gz` and prints its path.
 pub fn run(workspace: &Repository, options: &Options) -> Result<bool> {
     let programs = workspace.programs();
     let mut executables = Vec::new();
@@ -114,7 +114,7 @@ fn pack(root: &Path, name: &str, archive: &Path) -> Result<()> {
     write().into_diagnostic().wrap_err_with(|| archive.display().to_string())
 }
 
-/// The system of this compiler, as `rustc -vV` names it.
+/// Target triple of this compiler, from `rustc -vV`.
 fn host() -> Result<String> {
     let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
     let output = Command::new(rustc).arg("-vV").output().into_diagnostic().wrap_err("cannot start rustc")?;

@@ -1,4 +1,4 @@
-//! The licences of what our programs contain, for archives of binaries: each dependency with its terms and
+//! Licences of the dependencies of our programs, for archives of binaries: each dependency with its terms and
 //! their text.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -29,15 +29,14 @@ struct Package {
     source: Option<String>,
 }
 
-/// A dependency, its terms and their texts.
+/// Dependency, its terms and their texts.
 struct LinkedPackage {
     what: String,
     terms: String,
     texts: Vec<String>,
 }
 
-/// The text of `THIRD-PARTY.md`: crates that the programs are linked with, and the licences that they come
-/// with.
+/// Generates `THIRD-PARTY.md`: crates linked into the programs, and their licences.
 ///
 /// # Errors
 /// Cargo fails; a crate without terms.
@@ -60,7 +59,7 @@ pub fn text(workspace: &Repository, programs: &[String]) -> Result<String> {
     Ok(format_list(&mut parts))
 }
 
-/// Name and version of all crates that the programs are linked with on this machine.
+/// Lists name and version of all crates linked into the programs on this machine.
 fn linked(workspace: &Repository, programs: &[String]) -> Result<BTreeSet<String>> {
     let mut arguments = vec!["tree", "--locked", "--edges", "normal", "--prefix", "none", "--format", "{p}"];
     let packages: Vec<String> = programs.iter().filter_map(|program| workspace.package(program)).collect();
@@ -120,7 +119,7 @@ fn read_package(package: &Package, what: String, mit: &str, apache: &str) -> Res
     Ok(LinkedPackage { what, terms, texts })
 }
 
-/// The list of crates, then every licence text once, with the names of the crates that have it.
+/// Formats the list of crates, then every licence text once, with the names of its crates.
 fn format_list(parts: &mut [LinkedPackage]) -> String {
     parts.sort_by(|a, b| a.what.cmp(&b.what));
     let mut text = String::from(

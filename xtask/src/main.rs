@@ -1,5 +1,5 @@
-//! Project tasks, as `cargo xtask TASK`. They run the released command lines: what users run is what is
-//! judged and timed.
+//! Project tasks, as `cargo xtask TASK`. They run the released command lines: what users run is judged and
+//! timed.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -33,7 +33,7 @@ struct Cli {
 enum Task {
     /// Run all tests: the command of the README; lists skipped tests at the end.
     Test {
-        /// Passed on to `cargo test`, for example a test's name.
+        /// Arguments passed on to `cargo test`, for example a test's name.
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         arguments: Vec<String>,
     },
@@ -44,7 +44,7 @@ enum Task {
     /// Make the archive of a release for this system: programs, completions, man pages, licences of
     /// dependencies.
     Dist(dist::Options),
-    /// Check the tree: lengths of source files, sizes of files in git.
+    /// Check the tree: wording, lengths of source files, sizes of files in git.
     Tidy,
 }
 

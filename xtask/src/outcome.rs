@@ -7,27 +7,27 @@ use harness::report::{Judgement, Report, Value};
 /// Outcome of a case.
 #[derive(Default)]
 pub struct CaseOutcome {
-    /// `ch2/plate-with-hole`.
+    /// Name: `ch2/plate-with-hole`.
     pub case: String,
-    /// The case file, relative to the root where it lies below it.
+    /// Case file, relative to the root if it lies below.
     pub file: String,
     /// Link to the case file from target/validation.
     pub href: String,
-    /// The title in the case file.
+    /// Title in the case file.
     pub title: String,
-    /// The command line that ran it.
+    /// Command line that ran it.
     pub program: String,
     /// Command with which a user runs it.
     pub command: String,
-    /// The folder of its results.
+    /// Folder of its results.
     pub output: PathBuf,
     /// Output of the program.
     pub log: PathBuf,
-    /// Wall time of the whole program.
+    /// Wall time of the program, s.
     pub seconds: f64,
-    /// Not run again: the results of an earlier run hold.
+    /// True if the results of an earlier run are still valid.
     pub kept: bool,
-    /// Why it failed other than by its expectations: a crash, no report.
+    /// Failure other than an unmet expectation: a crash, no report.
     pub failure: Option<String>,
     /// Report of the run.
     pub report: Option<Report>,
@@ -39,7 +39,7 @@ impl CaseOutcome {
         Self { case: case.to_owned(), ..Self::default() }
     }
 
-    /// Takes over a report; `status` is how the program failed, if it did.
+    /// Adds a report; `status` is how the program failed, if it did.
     pub fn judge(&mut self, report: Report, status: Option<String>, quick: bool) {
         let missed = report.expect.iter().any(|judgement| !judgement.pass);
         self.failure = match status {
@@ -55,12 +55,12 @@ impl CaseOutcome {
         self.report = Some(report);
     }
 
-    /// The judged expectations.
+    /// Judged expectations.
     pub fn expect(&self) -> &[Judgement] {
         self.report.as_ref().map_or(&[], |report| &report.expect)
     }
 
-    /// The unit of a scalar, as its report has it.
+    /// Unit of a scalar in its report.
     pub fn unit(&self, quantity: &str) -> &str {
         match self.report.as_ref().and_then(|report| report.values.get(quantity)) {
             Some(Value::Scalar { unit, .. }) => unit,
@@ -68,7 +68,7 @@ impl CaseOutcome {
         }
     }
 
-    /// A scalar of the report with its unit, for a reader.
+    /// Formats a scalar of the report with its unit.
     pub fn scalar(&self, quantity: &str) -> Option<String> {
         match self.report.as_ref()?.values.get(quantity)? {
             Value::Scalar { value, unit } if unit.is_empty() => Some(format_number(*value)),
@@ -82,8 +82,8 @@ impl CaseOutcome {
         self.failure.is_none() && self.expect().iter().all(|judgement| judgement.pass)
     }
 
-    /// Verdict, quantity, value, requirement, kind, source of every expectation, and the failure if there is
-    /// one.
+    /// Formats verdict, quantity, value, requirement, kind, source of every expectation, and the failure if
+    /// there is one.
     pub fn rows(&self) -> impl Iterator<Item = [String; 6]> {
         let failure = self.failure.as_ref().map(|failure| {
             let [verdict, run, empty] = ["FAIL", "(run)", ""].map(str::to_owned);
@@ -114,7 +114,7 @@ impl CaseOutcome {
     }
 }
 
-/// Four significant digits.
+/// Formats four significant digits.
 fn format_number(value: f64) -> String {
     let size = value.abs();
     if value == 0.0 || !(1e-3..1e6).contains(&size) {
@@ -143,7 +143,7 @@ pub mod tests {
     use super::*;
     use harness::report::Named;
 
-    /// The text of a report with one expectation: kt = 3 ± 1 %.
+    /// Text of a report with one expectation: kt = 3 ± 1 %.
     pub fn report(value: f64) -> String {
         let mut report = Report::new("peri", "0", "");
         report.value(Named::new("kt", ""), value);

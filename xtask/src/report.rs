@@ -1,5 +1,5 @@
-//! The report of `cargo xtask validate`: target/validation/{report.html, report.json, validation.md}, and, of
-//! a whole full run, docs/validation.md.
+//! Report of `cargo xtask validate`: target/validation/{report.html, report.json, validation.md}, and after a
+//! complete full run docs/validation.md.
 
 use std::collections::BTreeMap;
 use std::io::Write as _;
@@ -31,7 +31,7 @@ mod timing;
 use baseline::{EarlierReport, ReportDifference};
 use pictures::{Gallery, ReportPicture};
 
-/// Pictures shown of each case in the list of cases.
+/// Number of pictures of each case in the list of cases.
 const PICTURES: usize = 6;
 
 /// Sources of the report besides the outcomes.
@@ -61,7 +61,7 @@ impl Sources {
 /// Amount of work of a validation.
 #[derive(Clone, Copy)]
 pub struct Tier {
-    /// Without what cases mark `quick = false`.
+    /// Cases without `quick = false`.
     pub quick: bool,
     /// All cases below cases/.
     pub everything: bool,
@@ -71,7 +71,7 @@ pub struct Tier {
 #[derive(Serialize)]
 struct Page {
     passed: bool,
-    /// All cases of the repository, not a choice of them.
+    /// True for all cases of the repository, false for a selection.
     everything: bool,
     tier: &'static str,
     sums: String,
@@ -94,7 +94,7 @@ struct Page {
     cases: Vec<CaseView>,
 }
 
-/// A case on the page.
+/// Case on the page.
 #[derive(Serialize)]
 struct CaseView {
     case: String,
@@ -105,7 +105,7 @@ struct CaseView {
     href: String,
     command: String,
     results: String,
-    /// Link to the page that shows its bodies.
+    /// Link to the page with its bodies.
     page: Option<String>,
     log: String,
     seconds: f64,
@@ -118,7 +118,7 @@ struct CaseView {
     work: Vec<(String, String)>,
 }
 
-/// report.json.
+/// Content of report.json.
 #[derive(Serialize)]
 struct Json<'a> {
     version: u32,
@@ -128,7 +128,7 @@ struct Json<'a> {
     date: String,
     machine: String,
     versions: Vec<(String, String)>,
-    /// Expectations by what kind of evidence they are.
+    /// Number of expectations by kind of evidence.
     kinds: BTreeMap<String, usize>,
     cases: Vec<JsonCase<'a>>,
     thesis: Vec<thesis::RowVerdict>,
@@ -171,7 +171,7 @@ impl<'a> JsonCase<'a> {
     }
 }
 
-/// Writes the report; the paths of what was written.
+/// Writes the report; returns the paths of its files.
 pub fn write(
     workspace: &Repository,
     sources: &Sources,
@@ -281,7 +281,7 @@ fn view(workspace: &Repository, outcome: &CaseOutcome, gallery: &mut Gallery) ->
     }
 }
 
-/// The page without its pictures, and the cases with their judgements.
+/// Report without pictures, and the cases with their judgements.
 fn json(page: Page, outcomes: &[CaseOutcome]) -> Json<'_> {
     Json {
         version: 1,
@@ -304,7 +304,7 @@ fn json(page: Page, outcomes: &[CaseOutcome]) -> Json<'_> {
     }
 }
 
-/// The page as HTML.
+/// Renders the page as HTML.
 fn render(page: &Page) -> Result<String> {
     let mut environment = minijinja::Environment::new();
     environment.add_template("report.html", include_str!("report/template.html")).into_diagnostic()?;
@@ -312,7 +312,7 @@ fn render(page: &Page) -> Result<String> {
     template.render(minijinja::value::Serde(page)).into_diagnostic()
 }
 
-/// `Fig. 2.7` → `fig-2-7`.
+/// Converts `Fig. 2.7` to `fig-2-7`.
 fn anchor(name: &str) -> String {
     let parts = name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|part| !part.is_empty());
     parts.collect::<Vec<_>>().join("-").to_lowercase()

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 /// Provenance of a bench's rows, or of a number that a test measured.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SourceStamp {
-    /// The commit that was checked out.
+    /// Commit that was checked out.
     commit: String,
     /// UTC, ISO 8601.
     date: String,
@@ -36,13 +36,13 @@ impl SourceStamp {
         })
     }
 
-    /// The sources are what they were.
+    /// Returns true if the sources have not changed.
     pub fn fresh(&self, root: &Path) -> bool {
         hash(root, &self.sources).is_ok_and(|now| now == self.hash)
     }
 }
 
-/// `2026-11-22, commit 0123456789, AMD EPYC`.
+/// Format: `2026-11-22, commit 0123456789, AMD EPYC`.
 impl fmt::Display for SourceStamp {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let day = self.date.split('T').next().unwrap_or(&self.date);
@@ -50,7 +50,7 @@ impl fmt::Display for SourceStamp {
     }
 }
 
-/// The numerics of `polycore`, on which the other crates rest.
+/// Numerics of `polycore` on which the other crates depend.
 const NUMERICS: [&str; 4] = ["constitutive", "langevin", "random", "tensor"];
 
 /// Lists the sources that numbers of crates depend on: `parts` of their folders (`src`, `tests`), and the

@@ -7,7 +7,7 @@ use harness::report::Kind;
 use crate::outcome::CaseOutcome;
 use crate::table::TextTable;
 
-/// Every expectation of every case, seconds by case, and a last line of sums.
+/// Formats every expectation of every case, seconds by case, and a last line with totals.
 pub fn text(outcomes: &[CaseOutcome]) -> String {
     let mut table = TextTable::new(["case", "quantity", "value", "expected", "kind", "verdict"]);
     let mut times = TextTable::new(["case", "program", "seconds", "expectations", "not satisfied"]);

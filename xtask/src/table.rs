@@ -9,14 +9,14 @@ pub fn print(text: &str) {
     let _ = std::io::stdout().write_all(text.as_bytes());
 }
 
-/// A heading and rows of as many cells.
+/// Heading and rows with as many cells.
 pub struct TextTable<const N: usize> {
     heading: [&'static str; N],
     rows: Vec<[String; N]>,
 }
 
 impl<const N: usize> TextTable<N> {
-    /// Without rows.
+    /// Creates a table without rows.
     pub fn new(heading: [&'static str; N]) -> Self {
         Self { heading, rows: Vec::new() }
     }
@@ -31,13 +31,13 @@ impl<const N: usize> TextTable<N> {
         self.rows.is_empty()
     }
 
-    /// Columns padded to their widest cell.
+    /// Formats columns padded to their widest cell.
     pub fn text(&self) -> String {
         let heading = self.heading.map(str::to_owned);
         aligned(&std::iter::once(&heading).chain(&self.rows).collect::<Vec<_>>())
     }
 
-    /// A table of GitHub's Markdown.
+    /// Formats a table of GitHub's Markdown.
     pub fn markdown(&self) -> String {
         let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
         let escape = |cell: &String| cell.replace('|', "\\|").replace('\n', " ");

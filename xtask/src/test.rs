@@ -1,5 +1,5 @@
-//! `cargo xtask test`: all tests; the numbers that they measure go to target/evidence.json, and what they
-//! could not test here is listed at the end.
+//! `cargo xtask test`: runs all tests; the numbers that they measure go to target/evidence.json, and skipped
+//! tests are listed at the end.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -18,7 +18,7 @@ use crate::workspace::Repository;
 /// Environment variable that crate `evidence` reads.
 const FOLDER: &str = "EVIDENCE_FOLDER";
 
-/// A number as a test measured it, the file of crate `evidence` in words of Rust.
+/// Number measured by a test, as crate `evidence` writes it.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TestRecord {
     /// Name, as cases/thesis.toml refers to it.
@@ -35,9 +35,9 @@ pub struct TestRecord {
     at_most: Option<f64>,
     /// True if the assertion held.
     pub met: bool,
-    /// `calibrate::tests::single_point_integrals`.
+    /// Test: `calibrate::tests::single_point_integrals`.
     pub test: String,
-    /// `crates/peri/src/calibrate.rs`.
+    /// Source file: `crates/peri/src/calibrate.rs`.
     pub file: String,
     /// Provenance of the test run; `None` in a file that a test has just written.
     pub stamp: Option<SourceStamp>,
@@ -61,7 +61,7 @@ enum StoredRecord {
 pub type Records = BTreeMap<String, TestRecord>;
 
 impl TestRecord {
-    /// The value and what was requested, for a reader.
+    /// Formats the value and the requirement.
     pub fn cells(&self) -> [String; 2] {
         let mut expect = json!({ "quantity": self.name, "kind": "bound", "source": "a test" });
         let asked = [
@@ -96,7 +96,7 @@ pub fn run(workspace: &Repository, arguments: &[String]) -> Result<bool> {
     let command = ["test", "--release", "--workspace"];
     let passed = workspace.cargo(&command, arguments, &[(FOLDER, &folder)])?;
     let (new, skips) = collect(&folder)?;
-    // a choice of tests leaves the numbers of the others
+    // a selection of tests keeps the numbers of the others
     let before = if arguments.is_empty() { Records::new() } else { read(workspace) };
     let records = stamped(workspace, before, new)?;
     atomic_write(workspace.target().join("evidence.json"), |file| {
@@ -107,14 +107,14 @@ pub fn run(workspace: &Repository, arguments: &[String]) -> Result<bool> {
     Ok(passed)
 }
 
-/// Earlier records, and new ones with stamps of their crates' sources.
+/// Merges earlier records and new ones, with stamps of their crates' sources.
 fn stamped(workspace: &Repository, mut records: Records, new: Vec<TestRecord>) -> Result<Records> {
     let mut stamps = BTreeMap::<String, SourceStamp>::new();
     for mut record in new {
         let of = record.file.strip_prefix("crates/").and_then(|rest| rest.split('/').next());
         let key = of.unwrap_or_default().to_owned();
         if !stamps.contains_key(&key) {
-            // tests of whole programs are of all crates
+            // tests of whole programs depend on all crates
             let crates = of.map_or_else(|| workspace.programs(), |name| vec![name.to_owned()]);
             let crates: Vec<&str> = crates.iter().map(String::as_str).collect();
             let sources = sources(workspace.root(), &crates, &["src", "tests"]);
@@ -126,7 +126,7 @@ fn stamped(workspace: &Repository, mut records: Records, new: Vec<TestRecord>) -
     Ok(records)
 }
 
-/// The records of the last runs; none where there was no run.
+/// Reads the records of the last runs; empty if there was no run.
 pub fn read(workspace: &Repository) -> Records {
     let text = fs::read_to_string(workspace.target().join("evidence.json")).unwrap_or_default();
     let records: Vec<TestRecord> = serde_json::from_str(&text).unwrap_or_default();
@@ -163,7 +163,8 @@ fn untested(skips: &[Skip]) -> String {
 mod tests {
     use super::*;
 
-    /// New records replace those of the same name; each is stale when its own crate changes, and only then.
+    /// New records replace those of the same name; each becomes stale when its own crate changes, and only
+    /// then.
     #[test]
     fn records_have_the_stamp_of_their_crate() {
         let root = tempfile::tempdir().expect("a folder");

@@ -17,7 +17,7 @@ const MOST_LINES: usize = 500;
 /// Largest size of a file in git.
 const MOST_BYTES: u64 = 1_000_000;
 
-/// Prints every finding; passes if there is none.
+/// Prints every finding; returns true if there is none.
 pub fn run(workspace: &Repository) -> Result<bool> {
     let files = tracked(workspace.root())?;
     let mut findings = Vec::new();
@@ -76,7 +76,7 @@ fn unused_dependencies(root: &Path, files: &[PathBuf]) -> Result<Vec<String>> {
     Ok(declared.keys().map(finding).collect())
 }
 
-/// Rust files under crates/*/src and xtask/src.
+/// Returns true for Rust files under crates/*/src and xtask/src.
 fn is_source(file: &Path) -> bool {
     let parts: Vec<_> = file.iter().filter_map(|part| part.to_str()).collect();
     let in_src = matches!(parts.as_slice(), ["crates", _, "src", ..] | ["xtask", "src", ..]);
@@ -115,7 +115,7 @@ mod tests {
         let files = ["Cargo.toml", "m/Cargo.toml"].map(PathBuf::from);
         let found = unused_dependencies(folder.path(), &files).expect("manifests");
         assert_eq!(found, ["Cargo.toml: `b` is declared but no crate uses it"]);
-        // and ours
+        // and those of this repository
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
         let files = tracked(&root).expect("files");
         assert_eq!(unused_dependencies(&root, &files).expect("manifests"), [""; 0]);

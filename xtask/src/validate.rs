@@ -1,4 +1,4 @@
-//! Runs the cases with the released command lines and judges everything that they expect.
+//! Runs the cases with the released command lines and judges all their expectations.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -18,7 +18,7 @@ mod execute;
 
 use execute::{Settings, run_case};
 
-/// Lines of a failed case's output that are shown.
+/// Number of lines of a failed case's output that are shown.
 const TAIL: usize = 30;
 
 /// Options of `validate`.
@@ -27,21 +27,20 @@ pub struct Options {
     /// Only cases in this folder of cases/, for example `ch2`; may be repeated.
     #[arg(long, value_name = "CHAPTER")]
     only: Vec<String>,
-    /// Leave out what the cases mark `quick = false`.
+    /// Leave out everything marked `quick = false`.
     #[arg(long)]
     quick: bool,
     /// Only this case: its folder or file, also one outside cases/; may be repeated.
     #[arg(long, value_name = "PATH")]
     case: Vec<PathBuf>,
-    /// Keep the results of cases that were run before and have not changed, and go on with one that was
-    /// interrupted.
+    /// Keep the results of cases that have not changed since they ran, and continue an interrupted one.
     #[arg(long)]
     resume: bool,
-    /// Run only part I of N of the cases, one that reads results of others in the part of those, and write no
-    /// report: then `--resume` puts together what all parts left in target/validation.
+    /// Run only part I of N of the cases (a case that reads results of others belongs to their part), and
+    /// write no report: `--resume` then combines the results of all parts in target/validation.
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
-    /// Compare with the report.json of an earlier run: what moved, and by how much.
+    /// Compare with the report.json of an earlier run: changed numbers, and their amounts.
     #[arg(long, value_name = "OLD.json")]
     baseline: Option<PathBuf>,
     /// Seconds after which a case is killed and counts as failed.
@@ -49,16 +48,16 @@ pub struct Options {
     timeout: f64,
 }
 
-/// A case file and its name, the folder below cases/.
+/// Case file and its name, the folder below cases/.
 pub struct CaseFile {
     name: String,
     file: PathBuf,
-    /// The folder of all cases.
+    /// Folder of all cases.
     root: PathBuf,
 }
 
 impl CaseFile {
-    /// Names and files of the scenes whose results it reads; what is wrong with them its program says.
+    /// Returns names and files of the scenes whose results it reads; its program reports errors in them.
     fn named_inputs(&self) -> Vec<(String, PathBuf)> {
         let Ok(source) = Source::read(&self.file) else { return Vec::new() };
         let inputs = source.inputs().unwrap_or_default().into_iter();
@@ -70,14 +69,14 @@ impl CaseFile {
         self.named_inputs().into_iter().map(|(_, file)| file).collect()
     }
 
-    /// The name of another case.
+    /// Resolves the name of another case.
     fn name_of(&self, file: &Path) -> String {
         name(&self.root, file)
     }
 }
 
-/// Puts cases behind those whose results they read; otherwise they keep their order. Those in a cycle come
-/// last: their program names it.
+/// Sorts cases after those whose results they read; otherwise keeps their order. Cases in a cycle come last:
+/// their program reports it.
 fn sort_by_inputs(cases: Vec<CaseFile>) -> Vec<CaseFile> {
     let mut waiting = cases;
     let mut ordered: Vec<CaseFile> = Vec::new();
@@ -94,7 +93,7 @@ fn sort_by_inputs(cases: Vec<CaseFile>) -> Vec<CaseFile> {
     }
 }
 
-/// A number of each case, counted from 0, that cases have in common that read results of each other.
+/// Numbers the cases, from 0, so that cases that read results of each other have the same number.
 fn chains(cases: &[CaseFile]) -> Vec<usize> {
     let mut of: Vec<usize> = (0..cases.len()).collect();
     for (index, case) in cases.iter().enumerate() {
@@ -110,7 +109,7 @@ fn chains(cases: &[CaseFile]) -> Vec<usize> {
     of.iter().map(|chain| known.partition_point(|other| other < chain)).collect()
 }
 
-/// Runs, prints, writes target/validation/{report.html, report.json}; passes if every case did.
+/// Runs, prints, writes target/validation/{report.html, report.json}; returns true if every case passed.
 pub fn run(workspace: &Repository, options: &Options) -> Result<bool> {
     let mut cases = find(workspace, options)?;
     if let Some(shard) = options.shard {
@@ -118,7 +117,7 @@ pub fn run(workspace: &Repository, options: &Options) -> Result<bool> {
         let mut chains = chains.iter();
         cases.retain(|_| chains.next().is_some_and(|&chain| shard.has(chain)));
     }
-    // read before anything is run for an hour
+    // read before the long run begins
     let map = report::Sources::read(workspace, options.baseline.as_deref())?;
     let settings = Settings {
         folder: workspace.results("validate")?,
@@ -166,7 +165,7 @@ fn command(outcome: &CaseOutcome, quick: bool) -> String {
     format!("cargo run --release -p {} -- run {}{quick}", outcome.program, outcome.file)
 }
 
-/// The cases requested, in alphabetical order, each behind those whose results it reads.
+/// Finds the requested cases, in alphabetical order, each after those whose results it reads.
 fn find(workspace: &Repository, options: &Options) -> Result<Vec<CaseFile>> {
     let all = workspace.root().join("cases");
     let mut files = Vec::new();
@@ -204,7 +203,7 @@ fn walk(folder: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
     Ok(())
 }
 
-/// cases/ch2/plate/case.toml → ch2/plate; elsewhere the folder's name.
+/// Name of a case: cases/ch2/plate/case.toml → ch2/plate; elsewhere the name of the folder.
 fn name(cases: &Path, file: &Path) -> String {
     let folder = file.parent().unwrap_or(file);
     let below = folder.strip_prefix(cases).ok().or_else(|| folder.file_name().map(Path::new));

@@ -1,4 +1,4 @@
-//! The brick of `crates/crystfem/benches/brick.rs`, and beside it, on the same mesh, CalculiX and scikit-fem.
+//! The brick of `crates/crystfem/benches/brick.rs`, compared on the same mesh with CalculiX and scikit-fem.
 
 use std::path::{Path, PathBuf};
 
@@ -12,13 +12,13 @@ use super::{Row, external};
 use crate::table::TextTable;
 use crate::workspace::Repository;
 
-/// Steps of a whole run.
+/// Number of steps of a run.
 pub const STEPS: u32 = 20;
 /// Elements along an edge of the largest brick that other programs solve, and of the largest that takes them
 /// seconds.
 const LARGEST: usize = 45;
 const SHORT: usize = 26;
-/// Turns, of which medians count; more of what is short.
+/// Number of rounds, whose medians count; more for short runs.
 const ROUNDS: usize = 3;
 const SHORT_ROUNDS: usize = 5;
 /// Displacement of inner nodes of the distorted brick, over its edge.
@@ -28,8 +28,8 @@ const DISTORTION: &str = "0.1";
 /// the point).
 const MEAN: (usize, f64) = (26, 476.763_119_07);
 const SAME_MEAN: f64 = 1e-7;
-/// Nodes agree up to here, K: what Newton's iterations leave, and half of the last digit that CalculiX
-/// prints.
+/// Tolerance of nodal temperatures, K: the error of Newton's iterations, and half of the last digit that
+/// CalculiX prints.
 const SAME_SCIKIT_FEM: f64 = 1e-5;
 const SAME_CALCULIX: f64 = 1e-4;
 
@@ -45,12 +45,12 @@ pub struct Brick {
 struct BrickRun {
     program: &'static str,
     edge: usize,
-    /// Seconds a step, and before the first one.
+    /// Seconds per step, and before the first one.
     step: f64,
     set_up: Option<f64>,
     iterations: Option<f64>,
     memory: Option<f64>,
-    /// Largest difference to ours at a node, K, and what is allowed.
+    /// Largest difference from our temperature at a node, K, and its limit.
     difference: Option<(f64, f64)>,
     mean: f64,
 }
@@ -122,7 +122,7 @@ struct BrickBench {
 }
 
 impl BrickBench {
-    /// A run of ours with lumped capacity, or with consistent one, which the others take too.
+    /// Runs our program with lumped capacity, or with consistent capacity as the others have it.
     fn ours(&self, edge: usize, lumped: bool) -> Result<BrickRun> {
         let words = format!("brick --threads 1 --elements {edge} --steps {STEPS}");
         let mut arguments: Vec<String> = words.split(' ').map(str::to_owned).collect();
@@ -154,7 +154,7 @@ impl BrickBench {
 
     fn calculix(&self, calculix: &Calculix, edge: usize) -> Result<BrickRun> {
         let mesh = self.read_mesh(edge)?;
-        // two lengths of runs: what a step takes, without reading the deck
+        // two lengths of runs give the time per step, without reading the input
         let short = calculix.run(&self.folder, &mesh, 2, "ITERATIVE SCALING")?;
         let long = calculix.run(&self.folder, &mesh, STEPS, "ITERATIVE SCALING")?;
         let step = (long.seconds - short.seconds) / f64::from(STEPS - 2);
@@ -209,7 +209,7 @@ impl BrickBench {
         })
     }
 
-    /// Takes turns over as lines and rows.
+    /// Adds the medians of the rounds to lines and rows.
     fn medians(&mut self, turns: Vec<Vec<BrickRun>>) {
         let mut turns = turns.into_iter();
         let Some(mut lines) = turns.next() else { return };
@@ -332,14 +332,14 @@ impl BrickBench {
         Ok(calculix::CalculixMesh::new(&format!("brick-{edge}.inp"), &text, nodes(edge)))
     }
 
-    /// Largest difference to ours at a node, K.
+    /// Largest difference from our temperature at a node, K.
     fn difference(&self, edge: usize, temperatures: &[f64]) -> Result<f64> {
         let ours = column(&self.file(edge, "csv"), "temperature")?;
         if ours.len() != temperatures.len() {
             return Err(miette!("{} temperatures, not {}", temperatures.len(), ours.len()));
         }
         let apart = |(a, b): (&f64, &f64)| (a - b).abs();
-        // NaN is the largest
+        // NaN counts as the largest
         Ok(ours.iter().zip(temperatures).map(apart).max_by(f64::total_cmp).unwrap_or(f64::NAN))
     }
 
@@ -356,7 +356,7 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// A column of a CSV.
+/// Reads a column of a CSV file.
 fn column(path: &Path, name: &str) -> Result<Vec<f64>> {
     let columns = csv::read(path).into_diagnostic()?;
     let found = columns.into_iter().find(|(heading, _)| heading.split_whitespace().next() == Some(name));

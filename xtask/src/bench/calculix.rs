@@ -1,4 +1,4 @@
-//! CalculiX as a separate program: its decks, and what it prints.
+//! CalculiX as a separate program: its input and output.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
 
-/// Names another program than `ccx`.
+/// Environment variable with another program than `ccx`.
 const VARIABLE: &str = "CCX";
 
 /// Installation of CalculiX.
@@ -15,7 +15,7 @@ pub struct Calculix {
     program: PathBuf,
 }
 
-/// A mesh in a file that a deck includes.
+/// Mesh in a file that the input includes.
 pub struct CalculixMesh {
     file: String,
     nodes: u64,
@@ -48,7 +48,7 @@ impl CalculixMesh {
         Self { file: file.to_owned(), nodes, sides }
     }
 
-    /// The whole deck: temperatures of all nodes are printed after the last step.
+    /// Formats the input: temperatures of all nodes are printed after the last step.
     fn deck(&self, steps: u32, solver: &str) -> String {
         let each = |line: &dyn Fn(u64, u8) -> String| -> String {
             self.sides.iter().map(|&(element, side)| line(element, side) + "\n").collect()
@@ -73,7 +73,7 @@ impl CalculixMesh {
 }
 
 impl Calculix {
-    /// Looks for it; else how to get it.
+    /// Finds the program; the error says how to install it.
     pub fn find() -> Result<Self, String> {
         let program = std::env::var_os(VARIABLE).map_or_else(|| PathBuf::from("ccx"), PathBuf::from);
         match Command::new(&program).arg("-v").stdin(Stdio::null()).output() {
@@ -85,7 +85,7 @@ impl Calculix {
         }
     }
 
-    /// Runs a deck in `folder`, where the mesh lies, on one thread.
+    /// Runs an input in `folder`, which contains the mesh, on one thread.
     pub fn run(&self, folder: &Path, mesh: &CalculixMesh, steps: u32, solver: &str) -> Result<CalculixRun> {
         std::fs::write(folder.join("calculix.inp"), mesh.deck(steps, solver)).into_diagnostic()?;
         let since = Instant::now();
@@ -119,7 +119,7 @@ impl Calculix {
     }
 }
 
-/// Lines `NODE VALUE` of one table, in the order of nodes.
+/// Parses lines `NODE VALUE` of one table, in the order of nodes.
 fn temperatures(printed: &str) -> Vec<f64> {
     let pair = |line: &str| {
         let mut words = line.split_whitespace();

@@ -1,5 +1,5 @@
 //! `crystfem`: error against run time of its kinetics, time integrators and linear solvers; then the
-//! [`brick`], on equal elements and on a distorted mesh.
+//! [`brick`], with equal elements and on a distorted mesh.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,20 +11,19 @@ use super::{Row, brick, external, write};
 use crate::table::TextTable;
 use crate::workspace::Repository;
 
-/// Elements along an edge of the brick unless the user gives others: 20 000, 100 000, 300 000, 1 000 000
-/// nodes.
+/// Default numbers of elements along an edge of the brick: 20 000, 100 000, 300 000, 1 000 000 nodes.
 const EDGES: &str = "26,45,66,99";
 
-/// The parts with other programs: the brick, and the same with inner nodes moved, so that no two elements are
-/// equal.
+/// Parts that run other programs: the brick, and the same with displaced inner nodes, so that no two elements
+/// are equal.
 const BRICK: &str = "brick";
 const DISTORTED: &str = "distorted";
 
 /// Curve: its name, and the measurements at each step length or tolerance.
 type BenchCurve = (String, Vec<(String, BTreeMap<String, f64>)>);
 
-/// Rows, tables, and whether other programs agree on the brick. `arguments` are names of parts (default: all)
-/// and edges of the brick. Rows and pictures of each part go to `folder`.
+/// Returns rows, tables, and whether other programs agree on the brick. `arguments` are names of parts
+/// (default: all) and edges of the brick. Rows and pictures of each part go to `folder`.
 pub fn run(workspace: &Repository, folder: &Path, arguments: &[String]) -> Result<(Vec<Row>, String, bool)> {
     let known = || PARTS.iter().map(|part| part.name).chain([BRICK, DISTORTED]);
     let (mut names, mut edges) = (Vec::new(), EDGES.to_owned());
@@ -72,11 +71,11 @@ struct BenchTable {
     title: &'static str,
     /// Heading of the table.
     heading: [&'static str; 6],
-    /// Other quantities than error and time that are shown.
+    /// Quantities shown besides error and time.
     more: [&'static str; 2],
     error: &'static str,
     time: &'static str,
-    /// First words of the curves of a picture each; one empty word for all curves.
+    /// First words of the curves of each picture; an empty word selects all curves.
     pictures: &'static [&'static str],
 }
 
@@ -132,8 +131,8 @@ impl BenchTable {
     }
 }
 
-/// Rows `CURVE PLACE: QUANTITY` and `CURVE PLACE: QUANTITY, PROBLEM`, collected in the order of their first
-/// appearance; other rows are of no curve.
+/// Collects rows `CURVE PLACE: QUANTITY` and `CURVE PLACE: QUANTITY, PROBLEM` in the order of their first
+/// appearance; other rows belong to no curve.
 fn curves(rows: &[Row]) -> Vec<BenchCurve> {
     let mut curves: Vec<BenchCurve> = Vec::new();
     for row in rows {

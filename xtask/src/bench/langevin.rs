@@ -24,11 +24,11 @@ use arguments::{ROW, arguments};
 /// Values of 𝓛⁻¹ to 20 digits: `function,argument,value`.
 const REFERENCE: &str = include_str!("../../../crates/polycore/tests/langevin_reference.csv");
 
-/// Rows per repeat, and repeats.
+/// Number of rows per repeat, and of repeats.
 const ROWS: usize = 200;
 const REPEATS: usize = 41;
 
-/// The rows, and a table of them; the picture goes to `folder`/langevin.{png,svg}.
+/// Returns the rows and their table; the picture goes to `folder`/langevin.{png,svg}.
 pub fn run(folder: &Path) -> Result<(Vec<Row>, String)> {
     let grid = grid();
     let arguments = arguments();

@@ -1,5 +1,5 @@
-//! `peri` beside LAMMPS' `peri/pmb`: the same elastic block, the same particles, horizon and steps,
-//! alternating runs in one go; and the forces of both, particle by particle.
+//! `peri` compared with LAMMPS' `peri/pmb`: the same elastic block, particles, horizon and steps, alternating
+//! runs in one session; and the forces of both, particle by particle.
 
 use std::path::{Path, PathBuf};
 
@@ -11,26 +11,26 @@ use super::{Row, external};
 use crate::table::TextTable;
 use crate::workspace::Repository;
 
-/// Distance of particles (m), horizon over it, bulk modulus (Pa): those of `crates/peri/benches/block.rs`.
+/// Spacing of particles (m), horizon over it, bulk modulus (Pa): those of `crates/peri/benches/block.rs`.
 const SPACING: f64 = 5e-4;
 const RATIO: f64 = 3.015;
 const BULK_MODULUS: f64 = 14.9e9;
 
-/// Particles along an edge, and steps of a run: seconds of LAMMPS.
+/// Particles along an edge, and steps of a run that takes LAMMPS seconds.
 const SIZES: [(u16, u32); 2] = [(22, 100), (46, 20)];
 const THREADS: [usize; 2] = [1, 2];
-/// Alternating pairs of runs, of which medians count.
+/// Number of alternating pairs of runs, whose medians count.
 const ROUNDS: usize = 5;
 
-/// Gradients of the displacement: bonds within 2 %, and compressed so far that particles touch.
+/// Gradients of the displacement: bonds within 2 %, and a compression in which particles touch.
 const SMALL: f64 = 0.01;
 const LARGE: f64 = 0.2;
 
-/// The forces are the same problem's up to here, in units of their root mean square: bonds are fitted to 1e-9
-/// of their force (the solver's bound), which together are about ten times what is left of them.
+/// Difference of forces that counts as agreement, in units of their root mean square: bonds are fitted to
+/// 1e-9 of their force (the solver's bound), and their sum is about ten times as large as the net force.
 const SAME: f64 = 1e-8;
 
-/// Rows, tables, and whether both programs solved the same problem.
+/// Returns rows, tables, and whether both programs solved the same problem.
 pub fn run(workspace: &Repository, folder: &Path) -> Result<(Vec<Row>, String, bool)> {
     let mut peers = Peers {
         lammps: Lammps::find(workspace)?,
@@ -99,7 +99,7 @@ enum Expectation {
 }
 
 impl Peers {
-    /// Forces of one displacement in both programs, and what makes them differ.
+    /// Compares forces of one displacement in both programs, and explains their differences.
     fn one_step(&mut self, cells: u16) -> Result<()> {
         let run = |peers: &Self| -> Result<Vec<[f64; 3]>> {
             peers.lammps.run(&peers.folder, SPACING, 0, 1)?;
@@ -125,7 +125,7 @@ impl Peers {
         self.judge("the same plus contact forces", &touching, &lammps, Expectation::Same)
     }
 
-    /// Alternating runs; gives LAMMPS' version and leaves its last forces for [`Self::after_steps`].
+    /// Alternates runs; returns LAMMPS' version and keeps its last forces for [`Self::after_steps`].
     fn alternate(&mut self, cells: u16, steps: u32, threads: usize) -> Result<String> {
         let (count, words) = (u64::from(cells).pow(3), [cells.to_string(), steps.to_string()]);
         let number = threads.to_string();
@@ -171,14 +171,14 @@ impl Peers {
         Ok(version)
     }
 
-    /// Forces at the end of the timed runs.
+    /// Compares forces at the end of the timed runs.
     fn after_steps(&mut self, cells: u16, steps: u32) -> Result<()> {
         let ours = self.snapshot(&format!("{cells} --steps {steps} --strain {SMALL} --partial-volumes"))?;
         let lammps = read_forces(&self.folder)?;
         self.judge(&format!("partial volumes, after {steps} steps"), &ours, &lammps, Expectation::Same)
     }
 
-    /// The initial displacement with its forces, also given to LAMMPS.
+    /// Computes the initial displacement with its forces, also as input of LAMMPS.
     fn start(&self, cells: u16, strain: f64) -> Result<Snapshot> {
         let start = self.snapshot(&format!("{cells} --steps 0 --strain {strain} --partial-volumes"))?;
         write_particles(&self.folder, &start, SPACING)?;
@@ -195,7 +195,7 @@ impl Peers {
         Snapshot::read(&path)
     }
 
-    /// Compares the forces of `state` with LAMMPS'; a row of their table.
+    /// Compares the forces of `state` with LAMMPS'; adds a row to their table.
     fn judge(&mut self, what: &str, state: &Snapshot, lammps: &[[f64; 3]], claim: Expectation) -> Result<()> {
         let Some(ForceDifference { largest, at, differing }) = compare(&state.forces, lammps) else {
             return Err(miette!("{what}: {} and {} forces, or all zero", state.forces.len(), lammps.len()));
@@ -231,7 +231,7 @@ fn median(values: &mut [f64]) -> f64 {
     values[values.len() / 2]
 }
 
-/// Load average of the last minute, where the system tells it.
+/// Load average of the last minute, if the system provides it.
 fn load() -> Option<f64> {
     std::fs::read_to_string("/proc/loadavg").ok()?.split_whitespace().next()?.parse().ok()
 }

@@ -10,7 +10,7 @@ use super::{Row, external};
 use crate::table::TextTable;
 use crate::workspace::Repository;
 
-/// Distances of particles, mm, unless the user gives others.
+/// Default spacings of particles, mm.
 const SPACINGS: &str = "10,5,2";
 
 /// Run of one method at one tolerance, on one lattice.
@@ -23,7 +23,7 @@ struct SolverRun {
     seconds: f64,
 }
 
-/// The rows, and a table of them; pictures go to `folder`/peri-solvers-{time,work}.png.
+/// Returns the rows and their table; pictures go to `folder`/peri-solvers-{time,work}.png.
 pub fn run(workspace: &Repository, folder: &Path, arguments: &[String]) -> Result<(Vec<Row>, String)> {
     let spacings = arguments.first().map_or(SPACINGS, String::as_str);
     let rows = external(&workspace.bench("peri")?, &["--solvers".to_owned(), spacings.to_owned()])?;
@@ -57,7 +57,7 @@ pub fn run(workspace: &Repository, folder: &Path, arguments: &[String]) -> Resul
 
 type SolverCurves = BTreeMap<(u64, String), Vec<SolverRun>>;
 
-/// Rows `METHOD TOLERANCE: QUANTITY`, collected.
+/// Collects rows `METHOD TOLERANCE: QUANTITY`.
 fn curves(rows: &[Row]) -> Result<SolverCurves> {
     let mut curves = SolverCurves::new();
     for row in rows {

@@ -8,7 +8,7 @@ use serde::Deserialize;
 
 use crate::workspace::Repository;
 
-/// Names another virtual environment than target/venv-scikit-fem.
+/// Environment variable with another virtual environment than target/venv-scikit-fem.
 const VARIABLE: &str = "SCIKIT_FEM_VENV";
 
 /// Installation of scikit-fem.
@@ -24,17 +24,17 @@ pub struct BrickFigures {
     /// Seconds for all steps.
     #[serde(rename = "loop")]
     pub looped: f64,
-    /// Most memory of the process, bytes.
+    /// Peak memory of the process, bytes.
     pub memory: f64,
     /// Iterations of conjugate gradients in all steps.
     pub iterations: f64,
 }
 
 impl ScikitFem {
-    /// Looks for it; else (inside) the command that installs it.
+    /// Finds the installation; the inner error is the command that installs it.
     ///
     /// # Errors
-    /// Where a folder cannot be looked into.
+    /// A folder that cannot be read.
     pub fn find(workspace: &Repository) -> Result<Result<Self, String>> {
         let folder = std::env::var_os(VARIABLE)
             .map_or_else(|| workspace.target().join("venv-scikit-fem"), PathBuf::from);
@@ -59,7 +59,7 @@ impl ScikitFem {
     /// Runs on one thread.
     ///
     /// # Errors
-    /// Where it fails.
+    /// If it fails.
     pub fn run(&self, folder: &Path, mesh: &Path, steps: u32) -> Result<BrickFigures> {
         std::fs::write(folder.join("brick.py"), include_str!("brick.py")).into_diagnostic()?;
         let mut command = Command::new(&self.python);

@@ -9,10 +9,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::outcome::CaseOutcome;
 
-/// Relative changes below this are rounding of another machine or instruction set.
+/// Relative changes below which a difference is rounding of another machine or instruction set.
 const STILL: f64 = 1e-6;
 
-/// The part of an earlier report.json that is compared.
+/// Part of an earlier report.json that is compared.
 #[derive(Deserialize)]
 pub struct EarlierReport {
     commit: Option<String>,
@@ -36,17 +36,17 @@ struct OldJudgement {
     pass: bool,
 }
 
-/// The difference between two reports.
+/// Difference between two reports.
 #[derive(Serialize)]
 pub struct ReportDifference {
     commit: String,
     date: String,
     moved: Vec<QuantityChange>,
-    /// Quantities that were compared.
+    /// Number of compared quantities.
     compared: usize,
 }
 
-/// A number that has changed.
+/// Changed number.
 #[derive(Serialize)]
 pub struct QuantityChange {
     case: String,
@@ -66,7 +66,7 @@ impl EarlierReport {
         })
     }
 
-    /// Compares everything that both have; seconds only where they have doubled or halved.
+    /// Compares everything that both reports have; seconds only if they have doubled or halved.
     pub fn compare(&self, outcomes: &[CaseOutcome]) -> ReportDifference {
         let (mut moved, mut compared) = (Vec::new(), 0);
         for outcome in outcomes {

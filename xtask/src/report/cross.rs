@@ -1,4 +1,4 @@
-//! Comparisons with programs that nobody here wrote. One that was not made is named, with what makes it.
+//! Comparisons with other programs. A missing comparison is listed with the command that makes it.
 
 use std::fs;
 
@@ -9,7 +9,7 @@ use crate::bench::{self, Bench, Row};
 use crate::test::{self, TestRecord};
 use crate::workspace::Repository;
 
-/// The comparisons.
+/// File of the comparisons.
 const FILE: &str = "cases/peers.toml";
 
 #[derive(Deserialize)]
@@ -18,30 +18,30 @@ struct Checks {
     test: Vec<TestCheck>,
 }
 
-/// A comparison by a bench.
+/// Comparison by a bench.
 #[derive(Deserialize)]
 struct BenchCheck {
     title: String,
     /// Rows of target/bench/NAME.json …
     bench: String,
-    /// … of which one holds all of these words.
+    /// … one of which contains all of these words.
     words: Vec<String>,
-    /// The largest number that counts as agreement; none where the difference has a stated cause.
+    /// Largest number that counts as agreement; `None` if the difference has a stated cause.
     agree: f64,
     command: String,
     needs: String,
 }
 
-/// A comparison by a test that runs the other program.
+/// Comparison by a test that runs the other program.
 #[derive(Deserialize)]
 struct TestCheck {
     title: String,
-    /// The name of its number, as the test gives it by crate `evidence`.
+    /// Name of its number in crate `evidence`.
     record: String,
     needs: String,
 }
 
-/// A comparison as made, or why it was not.
+/// Comparison, or the reason for which it is missing.
 #[derive(Serialize)]
 pub struct CrossCheck {
     title: String,
@@ -63,7 +63,7 @@ impl CrossCheck {
     }
 }
 
-/// All comparisons, from the rows that benches and the numbers that tests have left.
+/// Collects all comparisons, from rows of benches and numbers of tests.
 pub fn checked(workspace: &Repository) -> Result<Vec<CrossCheck>> {
     let checks = read(workspace)?;
     let made = |check: &BenchCheck| {
@@ -85,7 +85,7 @@ fn read(workspace: &Repository) -> Result<Checks> {
     toml::from_str(&text).into_diagnostic().wrap_err(FILE)
 }
 
-/// Verdict and tone.
+/// Returns verdict and tone.
 fn judged(agrees: bool, fresh: bool) -> (&'static str, &'static str) {
     match (agrees, fresh) {
         (false, _) => ("disagrees", "bad"),
@@ -114,7 +114,7 @@ impl TestCheck {
 }
 
 impl BenchCheck {
-    /// `fresh`: the sources that the bench measured have not changed.
+    /// Judges the comparison; `fresh`: the sources that the bench measured have not changed.
     fn judge(&self, bench: Option<&Bench>, fresh: bool) -> CrossCheck {
         let is_it = |row: &&Row| {
             let what = row.what.to_lowercase();
@@ -124,7 +124,7 @@ impl BenchCheck {
             .iter()
             .flat_map(|bench| &bench.rows)
             .filter(is_it)
-            // what JSON has no number for is no agreement
+            // a number that JSON cannot represent is no agreement
             .map(|row| (row, row.value.unwrap_or(f64::NAN)))
             .max_by(|a, b| a.1.total_cmp(&b.1));
         let (what, value, verdict, tone) = match worst {

@@ -1,4 +1,4 @@
-//! The rows of docs/errata.md, each with the number that proves it (cases/thesis.toml).
+//! Rows of docs/errata.md, each with the number that proves it (cases/thesis.toml).
 
 use std::fs;
 
@@ -14,7 +14,7 @@ use crate::workspace::Repository;
 pub struct Proof {
     /// Words of the row's first two cells that no other row has.
     pub says: String,
-    /// The case of the numbers.
+    /// Case of the numbers.
     pub case: Option<String>,
     /// Quantities that a case expects.
     #[serde(default)]
@@ -24,13 +24,13 @@ pub struct Proof {
     pub tests: Vec<TestNumber>,
 }
 
-/// A row of docs/errata.md.
+/// Row of docs/errata.md.
 pub struct Erratum {
     chapter: String,
     cells: [String; 4],
 }
 
-/// A row with its numbers.
+/// Row with its numbers.
 #[derive(Serialize)]
 pub struct ErratumVerdict {
     chapter: String,
@@ -44,7 +44,7 @@ pub struct ErratumVerdict {
 }
 
 impl Erratum {
-    /// All rows of docs/errata.md.
+    /// Reads all rows of docs/errata.md.
     pub fn read(workspace: &Repository) -> Result<Vec<Self>> {
         let text = fs::read_to_string(workspace.root().join("docs/errata.md"));
         Ok(parse(&text.into_diagnostic().wrap_err("docs/errata.md")?))
@@ -55,7 +55,7 @@ impl Erratum {
     }
 }
 
-/// Tables of four columns, below headings `## Chapter N: …`.
+/// Parses tables of four columns, below headings `## Chapter N: …`.
 fn parse(text: &str) -> Vec<Erratum> {
     let (mut rows, mut chapter, mut inside) = (Vec::new(), String::new(), false);
     for line in text.lines() {
@@ -75,7 +75,7 @@ fn parse(text: &str) -> Vec<Erratum> {
     rows
 }
 
-/// Cells of a row of Markdown; `\|` is no border, and other escapes are undone.
+/// Splits a row of Markdown into cells; `\|` is no separator, and other escapes are removed.
 fn cells(line: &str) -> Vec<String> {
     let (mut cells, mut cell, mut escaped) = (Vec::new(), String::new(), false);
     for letter in line.trim().trim_start_matches('|').chars() {
@@ -113,7 +113,7 @@ pub fn faults(workspace: &Repository, rows: &[Erratum], proofs: &[Proof]) -> Vec
     faults
 }
 
-/// Looks the numbers up.
+/// Evaluates the numbers of the rows.
 pub fn judge(rows: &[Erratum], proofs: &[Proof], found: &MeasuredNumbers) -> Vec<ErratumVerdict> {
     let judged = |row: &Erratum| {
         let proof = proofs.iter().find(|proof| row.is(proof));

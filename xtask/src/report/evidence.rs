@@ -12,20 +12,20 @@ use crate::outcome::CaseOutcome;
 use crate::test::Records;
 use crate::workspace::Repository;
 
-/// A quantity of a case, as named in cases/thesis.toml.
+/// Quantity of a case, as named in cases/thesis.toml.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CaseNumber {
     /// Quantity with an `[[expect]]` in its case, unless `judged` is false.
     pub quantity: String,
-    /// False for a number that is only shown: a loading of which the thesis prints no figure.
+    /// False for a number that is only shown: a loading for which the thesis prints no figure.
     #[serde(default = "default_true")]
     pub judged: bool,
     /// Description with the unit.
     pub what: String,
-    /// Another case than that of the row.
+    /// Case, if it is not that of the row.
     pub case: Option<String>,
-    /// The thesis' own figure, where it prints one.
+    /// Figure of the thesis, if it prints one.
     pub thesis: Option<String>,
 }
 
@@ -33,19 +33,19 @@ fn default_true() -> bool {
     true
 }
 
-/// A number that a test measures, as named in cases/thesis.toml.
+/// Number that a test measures, as named in cases/thesis.toml.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TestNumber {
-    /// The name that the test gives it by crate `evidence`.
+    /// Name in crate `evidence`.
     pub record: String,
     /// Description with the unit.
     pub what: String,
-    /// The thesis' own figure, where it prints one.
+    /// Figure of the thesis, if it prints one.
     pub thesis: Option<String>,
 }
 
-/// A row of numbers: what it is, what was found, what was expected, the verdict.
+/// Row of a number: description, value, requirement, state.
 #[derive(Clone, Debug, Serialize)]
 pub struct NumberRow {
     /// Description.
@@ -54,7 +54,7 @@ pub struct NumberRow {
     pub value: String,
     /// Value that the case requires.
     pub asked: String,
-    /// The thesis' figure, if any.
+    /// Figure of the thesis, if any.
     pub thesis: String,
     /// Source: a case's quantity, or a test.
     pub from: String,
@@ -80,8 +80,8 @@ pub enum NumberState {
     NotRun,
 }
 
-/// A verdict on findings, with a tone for the page: what is missed fails, what was met backs, the rest does
-/// not.
+/// Returns a verdict on numbers, with a tone for the page: a missed one fails, a met one supports, the others
+/// do not.
 pub fn verdict(findings: &[NumberRow]) -> Option<(&'static str, &'static str)> {
     let has = |state| findings.iter().any(|finding| finding.state == state);
     match () {
@@ -94,7 +94,7 @@ pub fn verdict(findings: &[NumberRow]) -> Option<(&'static str, &'static str)> {
 }
 
 impl CaseNumber {
-    /// Looks it up in what was run.
+    /// Evaluates the number in this run.
     pub fn find(&self, row: Option<&str>, outcomes: &[CaseOutcome]) -> NumberRow {
         let case = self.case.as_deref().or(row).unwrap_or_default();
         let from = format!("{case}: {}", self.quantity);
@@ -138,7 +138,7 @@ impl CaseNumber {
 }
 
 impl TestNumber {
-    /// Looks it up in what tests have left.
+    /// Evaluates the number in the records of the tests.
     pub fn find(&self, records: &Records, root: &Path) -> NumberRow {
         let empty = |state, from: String| NumberRow {
             what: self.what.clone(),
@@ -175,7 +175,7 @@ pub struct MeasuredNumbers<'a> {
 }
 
 impl MeasuredNumbers<'_> {
-    /// Looks numbers up.
+    /// Evaluates numbers.
     pub fn findings(
         &self,
         case: Option<&str>,
@@ -187,7 +187,7 @@ impl MeasuredNumbers<'_> {
     }
 }
 
-/// Adds what is wrong with numbers and tests.
+/// Adds defects of numbers and tests to `faults`.
 pub fn check(
     workspace: &Repository,
     case: Option<&str>,
@@ -221,7 +221,7 @@ pub fn check(
     }
 }
 
-/// The quantities that a case expects, and of what kinds.
+/// Lists the quantities that a case expects, and their kinds.
 fn expected(workspace: &Repository, case: &str) -> Result<BTreeMap<String, Vec<Kind>>> {
     let path = workspace.root().join("cases").join(case).join("case.toml");
     let text = fs::read_to_string(&path).map_err(|error| miette!("cases/{case}/case.toml: {error}"))?;

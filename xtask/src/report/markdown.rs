@@ -1,5 +1,5 @@
-//! docs/validation.md: what stays the same from day to day, without seconds; dates and machines are those of
-//! benches.
+//! Writes docs/validation.md: the results that do not change from day to day, without seconds; dates and
+//! machines are those of benches.
 
 use harness::report::Kind;
 
@@ -8,7 +8,7 @@ use crate::outcome::CaseOutcome;
 use crate::summary;
 use crate::table::TextTable;
 
-/// Sums, thesis map, links between scales, cases, fronts, cross-checks.
+/// Formats totals, thesis map, links between scales, cases, fronts, cross-checks.
 pub fn text(page: &Page, outcomes: &[CaseOutcome]) -> String {
     let mut text = format!(
         "# Validation\n\nWritten by `cargo xtask validate`: {}.\nThe same with pictures, every number and \

@@ -1,14 +1,14 @@
-//! Figures that no one here wrote, and ours beside them: the cases below cases/external.
+//! Comparison with external figures: the cases below cases/external.
 
 use harness::report::Kind;
 use serde::Serialize;
 
 use crate::outcome::CaseOutcome;
 
-/// The folder of cases/.
+/// Folder of cases/.
 const FOLDER: &str = "external/";
 
-/// A figure and ours.
+/// External figure and ours.
 #[derive(Serialize)]
 pub struct ExternalFigure {
     case: String,

@@ -1,4 +1,4 @@
-//! Pages of runs, for cases whose bodies are worth turning: those that tear, and those that are printed.
+//! Result pages of cases whose bodies are worth rotating: those that tear, and those that are printed.
 
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
@@ -7,8 +7,8 @@ use harness::view;
 
 use crate::outcome::CaseOutcome;
 
-/// Writes the page of a case that wrote fields of a fracture or a print, where its results are newer, and
-/// gives its path. None where there is nothing to turn.
+/// Writes the page of a case with fields of a fracture or a print, if its results are newer, and returns its
+/// path; `None` if there is no body.
 pub fn page(outcome: &CaseOutcome) -> Option<PathBuf> {
     let report = outcome.report.as_ref()?;
     let of_it =

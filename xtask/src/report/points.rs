@@ -7,8 +7,8 @@ use harness::report::Value;
 use crate::bench::Row;
 use crate::outcome::CaseOutcome;
 
-/// Rows of errors with the rows of times of the same point, of the largest size that has both: name, time,
-/// error.
+/// Pairs rows of errors with the rows of times of the same point, for the largest size that has both: name,
+/// time, error.
 pub fn pairs(rows: &[Row], error: &str, time: &str) -> Vec<(String, f64, f64)> {
     let key = |row: &Row, marker: &str| {
         let at = row.what.find(marker)?;
@@ -22,7 +22,7 @@ pub fn pairs(rows: &[Row], error: &str, time: &str) -> Vec<(String, f64, f64)> {
     for row in rows {
         let Some(name) = key(row, error) else { continue };
         let same = |other: &&Row| key(other, time).as_ref() == Some(&name);
-        // where a size is that of the problem, partners have the same
+        // if a size is that of the problem, both rows have the same
         let partner = rows.iter().filter(same).find(|other| other.size == row.size);
         let partner = partner.or_else(|| rows.iter().find(same));
         if let (Some(error), Some(time)) = (row.value, partner.and_then(|row| row.value)) {
@@ -39,7 +39,7 @@ pub fn pairs(rows: &[Row], error: &str, time: &str) -> Vec<(String, f64, f64)> {
     points.into_iter().map(|(_, name, time, error)| (name, time, error)).collect()
 }
 
-/// Rows `NAME,…` with numbers in two columns.
+/// Reads rows `NAME,…` with numbers in two columns.
 pub fn read_table_points(text: &str, error: usize, time: usize, scale: f64) -> Vec<(String, f64, f64)> {
     let point = |line: &str| {
         let cells: Vec<&str> = line.split(',').collect();
@@ -49,7 +49,7 @@ pub fn read_table_points(text: &str, error: usize, time: usize, scale: f64) -> V
     text.lines().skip(1).filter_map(point).collect()
 }
 
-/// Every point of every curve whose name begins so.
+/// Reads every point of every curve whose name begins with `prefix`.
 pub fn read_curve_points(outcome: &CaseOutcome, prefix: &str) -> Vec<(String, f64, f64)> {
     let values = outcome.report.iter().flat_map(|report| &report.values);
     let mut points = Vec::new();

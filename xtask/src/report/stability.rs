@@ -9,10 +9,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::outcome::CaseOutcome;
 
-/// Words in the names of cases whose every run is such a thing, though their scenes have no `description`.
+/// Words in the names of cases that consist of such runs, though their scenes have no `description`.
 const WORDS: [&str; 2] = ["stability", "extremes"];
 
-/// A run.
+/// Result of a run.
 #[derive(Serialize)]
 pub struct StabilityTrial {
     case: String,
@@ -23,7 +23,7 @@ pub struct StabilityTrial {
     passed: bool,
 }
 
-/// The trials that reports list; of cases without a list, a trial for each group of expectations.
+/// Collects the trials of reports; for cases without trials, one for each group of expectations.
 pub fn trials(outcomes: &[CaseOutcome]) -> Vec<StabilityTrial> {
     let mut trials = Vec::new();
     for outcome in outcomes {
@@ -49,7 +49,7 @@ pub fn trials(outcomes: &[CaseOutcome]) -> Vec<StabilityTrial> {
     trials
 }
 
-/// A row of suite.json, which some programs write beside their report.
+/// Row of suite.json, which some programs write beside their report.
 #[derive(Deserialize)]
 struct StabilityRow {
     case: String,
@@ -73,7 +73,7 @@ fn suite_trials(case: &str, output: &Path) -> Vec<StabilityTrial> {
     rows.into_iter().map(trial).collect()
 }
 
-/// `run.quantity` and `quantity[run]` by their runs.
+/// Groups `run.quantity` and `quantity[run]` by their runs.
 fn groups(expect: &[Judgement]) -> BTreeMap<&str, Vec<&Judgement>> {
     let mut groups = BTreeMap::<&str, Vec<&Judgement>>::new();
     for judgement in expect {
@@ -82,7 +82,7 @@ fn groups(expect: &[Judgement]) -> BTreeMap<&str, Vec<&Judgement>> {
     groups
 }
 
-/// The run and what of it.
+/// Splits a quantity into the run and its own name.
 fn parts(quantity: &str) -> (&str, &str) {
     match quantity.split_once('[').and_then(|(name, rest)| Some((rest.strip_suffix(']')?, name))) {
         Some(parts) => parts,

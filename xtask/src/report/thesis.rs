@@ -1,5 +1,4 @@
-//! The thesis map: every numbered figure and table that holds a result, and what became of it here
-//! (cases/thesis.toml).
+//! Thesis map: every numbered figure and table with a result, and our result (cases/thesis.toml).
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -48,7 +47,7 @@ pub const NUMBERED: &[&str] = &[
     "Appendix B",
 ];
 
-/// The file.
+/// Content of cases/thesis.toml.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ThesisMap {
@@ -61,7 +60,7 @@ pub struct ThesisMap {
     pub erratum: Vec<super::errata::Proof>,
 }
 
-/// A figure or table, or a link between scales.
+/// Figure or table, or a link between scales.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ThesisRow {
@@ -73,11 +72,11 @@ pub struct ThesisRow {
     pub shows: String,
     /// Our result.
     pub ours: String,
-    /// Claimed; holds only if its numbers do.
+    /// Claimed verdict; valid only if its numbers are met.
     pub verdict: Verdict,
-    /// The difference, or why it cannot be reproduced.
+    /// Difference, or the reason for which it cannot be reproduced.
     pub because: Option<String>,
-    /// The case, `ch2/dent`.
+    /// Case: `ch2/dent`.
     pub case: Option<String>,
     /// Quantities that the case expects.
     #[serde(default)]
@@ -100,13 +99,13 @@ pub enum Verdict {
     Verified,
     /// Differs, for the reason in `because`.
     Differs,
-    /// The text does not say enough; `because` says what is missing.
+    /// Not reproducible from the text of the thesis; `because` says what is missing.
     NotFromTheText,
     /// Not done yet; `because` says what is missing.
     Open,
 }
 
-/// A row with what was found.
+/// Row with its results.
 #[derive(Serialize)]
 pub struct RowVerdict {
     number: String,
@@ -138,7 +137,7 @@ impl RowVerdict {
         self.verdict
     }
 
-    /// Pictures are for the page only.
+    /// Removes the pictures, which are for the page only.
     pub fn without_pictures(mut self) -> Self {
         self.pictures.clear();
         self
@@ -153,7 +152,7 @@ impl ThesisMap {
         toml::from_str(&text).map_err(|error| miette!("cases/thesis.toml: {error}"))
     }
 
-    /// Every row is there once and rests on something that exists; the list of what is wrong.
+    /// Checks that every row appears once and refers to something that exists; returns the defects.
     pub fn faults(&self, workspace: &Repository) -> Vec<String> {
         let mut faults = Vec::new();
         let mut seen = BTreeSet::new();
@@ -182,7 +181,7 @@ impl ThesisMap {
         faults
     }
 
-    /// Looks everything up: figures and tables, and links.
+    /// Evaluates all rows: figures and tables, and links.
     pub fn judge(&self, found: &MeasuredNumbers, gallery: &mut Gallery) -> [Vec<RowVerdict>; 2] {
         [&self.row, &self.link].map(|rows| rows.iter().map(|row| row.judge(found, gallery)).collect())
     }
@@ -229,7 +228,8 @@ mod tests {
         Repository::new(std::path::PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(".."))
     }
 
-    /// Every figure and table has a row, and every row a quantity that a case expects or a test that says so.
+    /// Every figure and table has a row, and every row a quantity that a case expects or a test that measures
+    /// it.
     #[test]
     fn the_map_is_whole() {
         let map = ThesisMap::read(&workspace()).expect("cases/thesis.toml");
@@ -259,7 +259,7 @@ mod tests {
         assert_eq!(row(test), ["Fig. 2.7: no test in crates/ measures \"no such\""]);
     }
 
-    /// A row that rests on our own earlier figures only is refused.
+    /// A row that relies on our own earlier figures alone is refused.
     #[test]
     fn regressions_are_no_evidence() {
         let root = tempfile::tempdir().expect("a folder");

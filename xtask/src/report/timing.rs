@@ -1,4 +1,4 @@
-//! Error against run time, from what `cargo xtask bench` has measured and from cases that time themselves.
+//! Error against run time, from measurements of `cargo xtask bench` and from cases that time themselves.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -15,18 +15,18 @@ use crate::outcome::CaseOutcome;
 use crate::stamp::SourceStamp;
 use crate::workspace::Repository;
 
-/// The alternatives, cases/timing.toml.
+/// File of the alternatives: cases/timing.toml.
 const FILE: &str = "cases/timing.toml";
 
 /// Source of the points of a subject.
 #[derive(Deserialize)]
 #[serde(rename_all = "lowercase", deny_unknown_fields)]
 enum PointSource {
-    /// Rows of target/bench/NAME.json: what distinguishes those of errors and those of times, the rest being
-    /// a point.
+    /// Rows of target/bench/NAME.json: words that distinguish rows of errors and of times; the rest of a name
+    /// is the point.
     Bench { name: String, error: String, time: String },
-    /// A table among a case's results: a method a row, its name in the first column; these columns, the times
-    /// multiplied.
+    /// Table among a case's results: one method per row, its name in the first column; columns of error and
+    /// time, and a factor of the times.
     Table { case: String, file: String, error: usize, time: usize, scale: f64 },
     /// Curves of a case's report: columns `seconds` and, last, errors.
     Case { name: String, curves: String },
@@ -37,7 +37,7 @@ struct Subjects {
     subject: Vec<Subject>,
 }
 
-/// Alternatives for one thing.
+/// Alternatives for one task.
 #[derive(Deserialize)]
 struct Subject {
     title: String,
@@ -46,7 +46,7 @@ struct Subject {
     /// Separator of method and setting in a point's name.
     #[serde(default = "line_break")]
     split: String,
-    /// The method that is taken where a scene names none.
+    /// Method by default.
     default: String,
     axes: [String; 2],
     /// Command that measures it.
@@ -55,12 +55,12 @@ struct Subject {
     note: String,
 }
 
-/// Splits no name.
+/// Separator that occurs in no name.
 fn line_break() -> String {
     "\n".to_owned()
 }
 
-/// A subject as measured.
+/// Measured subject.
 #[derive(Serialize)]
 pub struct TimingSubject {
     title: String,
@@ -74,13 +74,13 @@ pub struct TimingSubject {
     /// Provenance of a bench's measurement; `None` for measurements of this run's cases.
     #[serde(skip_serializing_if = "Option::is_none")]
     measured: Option<String>,
-    /// The sources that the bench measured have changed.
+    /// True if the sources that the bench measured have changed.
     stale: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
     picture: Option<String>,
 }
 
-/// A method with one setting.
+/// Method with one setting.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TimingPoint {
     method: String,
@@ -95,14 +95,14 @@ pub struct TimingPoint {
 }
 
 impl TimingSubject {
-    /// Pictures are for the page only.
+    /// Removes the picture, which is for the page only.
     pub fn without_picture(mut self) -> Self {
         self.picture = None;
         self
     }
 
-    /// The subject, the methods on its front, where the default is, and by what it was measured; for
-    /// docs/validation.md.
+    /// Cells for docs/validation.md: the subject, the methods on its front, the place of the default, and the
+    /// measurement.
     pub fn cells(&self) -> Option<[String; 4]> {
         let mut front: Vec<&str> =
             self.points.iter().filter(|p| p.front).map(|p| p.method.as_str()).collect();
@@ -218,7 +218,7 @@ impl Subject {
     }
 }
 
-/// Marks what nothing measured beats in both.
+/// Marks the points that no other point beats in both.
 fn front(points: &mut [TimingPoint]) {
     let all: Vec<(f64, f64)> = points.iter().map(|point| (point.time, point.error)).collect();
     for point in points {

@@ -3,7 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Words with which a doc comment must not begin: the reader learns what an item is only later.
-const PRONOUNS: &str = "What Where Of Whether Its How Those That These This They It Which Who When As In By From \
+const PRONOUNS: &str = "What Where Of Whether Its How Those That These This They It Which Who When As In By \
+                        From \
                         With For At On To If So Into Whose Than Such There Here Thus Their One Both None Nothing \
                         Everything";
 
@@ -11,7 +12,8 @@ const PRONOUNS: &str = "What Where Of Whether Its How Those That These This They
 const MOST_PRONOUNS: f64 = 0.01;
 
 /// Names that no public function has: prepositions, pronouns, auxiliaries, and words with several meanings.
-const WORDS: &str = "own one told said laid lay held hold holds meets look looks has have had does leap still taken \
+const WORDS: &str = "own one told said laid lay held hold holds meets look looks has have had does leap \
+                     still taken \
                      part know spend may yes place round release sever slack taut its for";
 
 /// Names of one or two letters that are symbols of the field.
@@ -177,7 +179,8 @@ mod tests {
 
     #[test]
     fn doc_comments() {
-        let text = "//! What it is.\n//! Where it is.\n\n/// Returns x.\nfn a() {}\n    /// Italian.\n// As before\n";
+        let text = "//! What it is.\n//! Where it is.\n\n/// Returns x.\nfn a() {}\n    /// Italian.\n// As \
+                    before\n";
         let found = words(&[("a.rs", text)]);
         assert_eq!((found.comments, found.pronouns.len()), (3, 1));
         assert_eq!(found.findings(), ["a.rs:1: a doc comment begins with `What`"]);

@@ -19,7 +19,7 @@ use crate::outcome::CaseOutcome;
 pub struct Settings {
     /// Folder of the results.
     pub folder: PathBuf,
-    /// Leave out what the cases mark `quick = false`.
+    /// Leave out parts marked `quick = false`.
     pub quick: bool,
     /// Keep the results of cases that have not changed.
     pub resume: bool,
@@ -50,7 +50,7 @@ struct RunEnd {
     failure: Option<String>,
 }
 
-/// Never an error: whatever goes wrong is the outcome of this case.
+/// Runs the case. Never fails: an error is the outcome of this case.
 pub fn run_case(
     settings: &Settings,
     case: &CaseFile,
@@ -98,7 +98,7 @@ fn attempt(
             let since = Instant::now();
             let failure = start(&executable, case, settings, outcome, unfinished)?;
             let ended = RunEnd { seconds: since.elapsed().as_secs_f64(), failure };
-            // a case that was cut off is not kept
+            // an aborted case is not kept
             let keep = outcome.output.join(FILE_NAME).is_file();
             write(&path, &CaseStamp { fingerprint, ended: keep.then(|| ended.clone()) })?;
             ended
@@ -113,7 +113,7 @@ fn attempt(
     Ok(())
 }
 
-/// The keys that every case has: `program = "peri"`, `title = "…"`.
+/// Reads the keys that every case has: `program = "peri"`, `title = "…"`.
 fn heading(file: &Path) -> Result<(String, String)> {
     let text = fs::read_to_string(file).into_diagnostic()?;
     let table: toml::Table = toml::from_str(&text).map_err(|error| miette!("{}", error.message()))?;
@@ -158,8 +158,8 @@ fn clear(folder: &Path) -> Result<()> {
     fs::create_dir_all(folder).into_diagnostic()
 }
 
-/// `PROGRAM run CASE --output FOLDER [--quick]` or `PROGRAM resume FOLDER`, its output in FOLDER.log; how it
-/// failed.
+/// Runs `PROGRAM run CASE --output FOLDER [--quick]` or `PROGRAM resume FOLDER`, its output in FOLDER.log;
+/// returns how it failed.
 fn start(
     executable: &Path,
     case: &CaseFile,
@@ -195,7 +195,7 @@ fn start(
     }
 }
 
-/// The exit status, or none for a program that was killed because it took too long.
+/// Waits for a program; returns its exit status, or `None` if it was killed after the time limit.
 fn wait(mut child: Child, timeout: f64) -> std::io::Result<Option<ExitStatus>> {
     let since = Instant::now();
     let mut pause = Duration::from_millis(2);
@@ -228,7 +228,7 @@ fn describe(status: ExitStatus) -> Option<String> {
 mod tests {
     use super::*;
 
-    /// A case run by a shell script instead of a program.
+    /// Case run by a shell script instead of a program.
     struct Stage {
         folder: tempfile::TempDir,
         case: CaseFile,

@@ -30,6 +30,7 @@ impl Surrogate<f64> {
 
     /// Reads a law, to the bit.
     ///
+    /// # Errors
     /// [`Error::File`] for a file that is not safetensors or lacks our header, and for weights that do not
     /// fit the architecture of the header; I/O errors.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, crate::Error> {
