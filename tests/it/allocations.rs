@@ -1,9 +1,9 @@
-//! The memory that a piece of work takes on its own thread.
+//! Measurement of the memory that work allocates on its own thread.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-/// The system's allocator, counting the bytes that each thread holds.
+/// System allocator that counts the bytes of each thread.
 struct Counting;
 
 thread_local! {
@@ -17,7 +17,7 @@ fn count(bytes: i64) {
     MOST.set(MOST.get().max(held));
 }
 
-// SAFETY: every call is passed on to the system's allocator as it is; the counters need no allocation and no
+// SAFETY: every call is passed on to the system's allocator unchanged; the counters need no allocation and no
 // destructor.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {

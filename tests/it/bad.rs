@@ -1,7 +1,7 @@
 //! Malformed and absurd input: exit code 2, the message that helps, nothing written, no panic.
 //!
 //! Each scene is a patch of a valid one, with its fault and its message: `tests/bad/peri.txt` and
-//! `crystfem.txt`, whose heads tell how they are read; the valid scenes are in `tests/bad/peri/` and
+//! `crystfem.txt`, whose heads describe the format; the valid scenes are in `tests/bad/peri/` and
 //! `crystfem/`.
 
 use crate::program::{Ended, command, executable, finish, peri, workspace};
@@ -21,7 +21,7 @@ fn every_bad_scene_of_a_part_gets_its_message() {
     judge_all("crystfem", 118);
 }
 
-/// A scene with one fault.
+/// Scene with one fault.
 pub struct BadScene {
     pub name: String,
     pub text: String,
@@ -29,7 +29,7 @@ pub struct BadScene {
     expected: Vec<String>,
 }
 
-/// Reads the patches of a program and writes their scenes, and the files that they name, to a folder.
+/// Reads the patches of a program and writes their scenes and files to a folder.
 pub fn write_bad_scenes(program: &str, folder: &Path) -> Vec<BadScene> {
     let bad = workspace().join("tests/bad");
     for files in ["clouds", "inputs"] {
@@ -58,7 +58,7 @@ pub fn write_bad_scenes(program: &str, folder: &Path) -> Vec<BadScene> {
     entries.collect()
 }
 
-/// Applies a patch; its error is the line that is not in the base.
+/// Applies a patch; the error is the line that is missing in the base.
 fn patched(base: &str, patch: &[&str]) -> Result<String, String> {
     let mut rest = base.lines();
     let mut scene: Vec<&str> = Vec::new();
@@ -132,7 +132,7 @@ fn judge(program: &str, folder: &Path, scene: &BadScene) -> Result<(), String> {
     Ok(())
 }
 
-/// Checks and runs a scene with the given bytes; returns what `check` told.
+/// Checks and runs a scene with the given bytes; returns the output of `check`.
 fn refused(bytes: &[u8], arguments: &str) -> Ended {
     let directory = tempfile::tempdir().unwrap();
     fs::write(directory.path().join("scene.toml"), bytes).unwrap();
@@ -164,7 +164,7 @@ fn nesting_without_end() {
     refused(deep("title = \"", "long", "\"\n").as_bytes(), "").tells("`program` is missing");
 }
 
-/// A valid scene cut anywhere is refused, or is itself valid (where only a trailing part is gone); it never
+/// A valid scene cut anywhere is refused, or is itself valid (if only a trailing part is missing); it never
 /// panics.
 #[test]
 fn cut_anywhere() {

@@ -1,4 +1,4 @@
-//! A headless Chromium, driven by chromedriver: <https://www.w3.org/TR/webdriver2/>.
+//! Headless Chromium, driven by chromedriver: <https://www.w3.org/TR/webdriver2/>.
 
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Read, Write};
@@ -7,10 +7,10 @@ use std::path::Path;
 use std::process::{Child, ChildStdout, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// Longer than anything on a page takes on a busy machine.
+/// Time limit of any action on a page, on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-/// A browser with one page.
+/// Browser with one page.
 pub struct Browser {
     driver: Child,
     port: u16,
@@ -20,7 +20,7 @@ pub struct Browser {
 }
 
 impl Browser {
-    /// Opens a file in a window of a size; none, said by name, where there is no chromedriver.
+    /// Opens a file in a window of the given size; `None`, with a message, without chromedriver.
     pub fn open(page: &Path, [width, height]: [u32; 2]) -> Option<Self> {
         let started =
             Command::new("chromedriver").arg("--port=0").stdout(Stdio::piped()).stderr(Stdio::null()).spawn();
@@ -55,7 +55,7 @@ impl Browser {
         Some(browser)
     }
 
-    /// A command of the protocol, and its value.
+    /// Sends a command of the protocol; returns its value.
     #[track_caller]
     fn ask(&self, method: &str, path: &str, body: &Value) -> Value {
         let mut stream = TcpStream::connect(("127.0.0.1", self.port)).unwrap();
@@ -86,7 +86,7 @@ impl Browser {
         value
     }
 
-    /// The value of an expression in the page.
+    /// Evaluates an expression in the page.
     #[track_caller]
     pub fn value(&self, expression: &str) -> Value {
         self.ask("POST", "/execute/sync", &json!({ "script": format!("return {expression}"), "args": [] }))
@@ -122,7 +122,7 @@ impl Browser {
         self.ask("POST", &format!("/element/{element}/value"), &json!({ "text": keys }));
     }
 
-    /// Drags fingers across the window, or the mouse with its button down, which pauses on the way; each from
+    /// Drags fingers across the window, or the mouse with its button down, with a pause on the way; each from
     /// one place to another.
     #[track_caller]
     pub fn drag(&self, kind: &str, ways: &[[[f64; 2]; 2]]) {
@@ -143,7 +143,7 @@ impl Browser {
         self.ask("POST", "/actions", &json!({ "actions": actions }));
     }
 
-    /// A picture of the window, where `VIEW_PICTURES` names a folder for them.
+    /// Takes a screenshot if `VIEW_PICTURES` names a folder.
     pub fn picture(&self, name: &str) {
         if let Some(folder) = std::env::var_os("VIEW_PICTURES") {
             let taken = self.ask("GET", "/screenshot", &json!({}));
@@ -160,7 +160,7 @@ impl Browser {
         self.log("browser").into_iter().filter(|entry| entry["level"] == "SEVERE").collect()
     }
 
-    /// Addresses that the page asked for, besides itself and what it holds.
+    /// Addresses that the page requested, besides itself and its content.
     pub fn requests(&self) -> Vec<String> {
         let told = |entry: &Value| -> Option<String> {
             let message: Value = serde_json::from_str(entry["message"].as_str()?).ok()?;

@@ -48,7 +48,7 @@ fn wrong_usage_is_bad_input() {
     for threads in ["0", "-1", "5000", "many"] {
         peri(&format!("exact kirsch --threads={threads}"), here).with_code(2).tells("--threads");
     }
-    // negative numbers are values: their range is told
+    // negative numbers are values: the message states their range
     peri("exact law --links -5", here).with_code(2).tells("links: found -5");
     peri("run a.toml --checkpoint-every -1", here).with_code(2).tells("-1 is not within 0 to 1e9");
     peri("exact kirsch --threads -1", here).with_code(2).tells("-1 is not in 1..=4096");
@@ -58,7 +58,7 @@ fn wrong_usage_is_bad_input() {
     }
 }
 
-/// `| head` closes the pipe early: no reason to fail, and no panic. A full disk is one.
+/// `| head` closes the pipe early, which is no failure and no panic; a full disk is a failure.
 #[test]
 fn standard_output_that_takes_no_more() {
     let here = workspace();
@@ -114,7 +114,7 @@ fn inputs_of_mdsurrogate_that_cannot_be_used() {
     run(ask).with_code(0).shows("2 predictions, 2 of them flagged");
     let answers = harness::output::csv::read(here.join("answers.csv")).unwrap();
     let column = |name: &str| &answers.iter().find(|(heading, _)| heading == name).unwrap().1;
-    // an energy has no stress at rest; C11 = 1 was no training row; shear was never seen
+    // an energy has no stress at rest; C11 = 1 was no training row; there was no shear
     assert_eq!(column("S11 [MPa]")[0], 0.0);
     assert_eq!(*column("never seen"), [0.0, 1.0]);
     assert_eq!(column("tangent 11 22 [MPa]"), column("tangent 22 11 [MPa]"));
@@ -135,7 +135,7 @@ fn completions() {
     peri("completions cmd", here).with_code(2).tells("possible values");
 }
 
-/// Rows of numbers below a head line, as [`f64`]; words are left out.
+/// Reads rows of numbers below a heading as [`f64`]; words are left out.
 fn row(text: &str, begin: &str) -> Vec<f64> {
     let line = text.lines().find(|line| line.trim_start().starts_with(begin));
     let line = line.unwrap_or_else(|| panic!("no line `{begin}` in\n{text}"));
@@ -162,7 +162,7 @@ fn kirsch_of_the_textbook() {
         // six printed digits
         near(&row(&ended.stdout, &format!("{y:.2}")), &[xx, yy], 0.5e-6);
     }
-    // Heywood's gross factor, as the issue's plate has it
+    // Heywood's gross factor for the plate of the issue
     ended.shows("peak 3.047");
     peri("exact kirsch --width-ratio 1", workspace()).with_code(2).tells("--width-ratio: found 1");
     peri("exact kirsch --width-ratio nan", workspace()).with_code(2).tells("--width-ratio: found NaN");
@@ -242,7 +242,7 @@ fn check_tells_what_is_built_and_what_is_left_out() {
     ended.shows("  leaves out body forces");
     let line = "builds     a crack, (100, 0, 0) – (100, 20, 0) – (100, 0, 40) mm:";
     let severed = row(&ended.stdout, line)[0] as usize;
-    // pairs that meet the very edge of the crack are on either side of it by rounding
+    // pairs that meet the edge of the crack are on either side of it by rounding
     assert!((pairs_across_the_crack(19)..=pairs_across_the_crack(20)).contains(&severed), "{severed}");
     for built in ["surface-correction", "volume correction", "prescribed displacements", "the stress pass"] {
         assert!(!ended.stdout.contains(&format!("leaves out {built}")), "{}", ended.stdout);
@@ -347,7 +347,7 @@ source = "a coarse lattice is below Kirsch's peak"
     }
 }
 
-/// The field file, read by polycore, holds what the report says.
+/// The field file, read by polycore, agrees with the report.
 fn fields_agree(out: &Path, report: &serde_json::Value) {
     let series = vtkhdf::read(out.join("dx-20mm_m-3.015.vtkhdf")).unwrap();
     assert_eq!((series.len(), series.number_of_points()), (1, particles_of_the_plate()));
@@ -370,7 +370,7 @@ fn fields_agree(out: &Path, report: &serde_json::Value) {
     }
 }
 
-/// A PNG file of some size that is not of one colour: such a picture compresses to nothing.
+/// A PNG file of the given size with more than one colour: a plain picture compresses to nothing.
 fn is_a_picture(path: &Path) {
     let bytes = fs::read(path).unwrap();
     assert!(bytes.starts_with(b"\x89PNG\r\n\x1a\n"), "{}", path.display());
@@ -396,14 +396,14 @@ fn a_failed_expectation_is_exit_code_1() {
     let found = report(&here.join("out"));
     assert_eq!((&found["passed"], &found["expect"][0]["pass"]), (&false.into(), &false.into()));
 
-    // a name that no run of the scene gives is refused at once
+    // a name that no run of the scene can have is refused at once
     fs::write(here.join("plate.toml"), expect("hardy_peek")).unwrap();
     for verb in ["check plate.toml", "run plate.toml --output refused"] {
         peri(verb, here).with_code(2).tells("found `hardy_peek`; allowed: `hardy_peak`");
     }
     assert!(!here.join("refused").exists());
 
-    // one that it gives only where bonds break fails where none does
+    // one that exists only if bonds break fails if none does
     let whole = expect("first_break").replace("links = 720", "links = 720\ncritical = { stretch = 3.0 }");
     fs::write(here.join("plate.toml"), whole).unwrap();
     let ended = peri("run plate.toml --output out", here).with_code(1);
@@ -424,7 +424,7 @@ fn a_run_that_does_not_converge_leaves_no_report() {
     ended.tells("not converged after 5 iterations");
     ended.tells("residual");
     ended.tells("needed 1.000e-6");
-    // not even that of the run before
+    // not even that of the previous run
     assert!(!here.join("out/report.json").exists());
 }
 

@@ -1,5 +1,4 @@
-//! The commands and links of README and docs: those that are cheap are run, the others must at least be
-//! understood.
+//! Commands and links of README and docs: cheap commands are run, the others must at least be accepted.
 
 use crate::program::{command, finish, workspace};
 use std::fs;
@@ -36,8 +35,8 @@ fn documents() -> Vec<PathBuf> {
     found
 }
 
-/// Commands in fences marked as shell, a backslash joining lines; output, comments and other languages are
-/// left out.
+/// Collects commands in fences marked as shell; a backslash joins lines; output, comments and other languages
+/// are left out.
 fn commands_of(file: &Path) -> Vec<Shown> {
     let text = fs::read_to_string(file).unwrap();
     let (mut shown, mut shell, mut inside) = (Vec::new(), false, false);
@@ -65,7 +64,7 @@ fn commands_of(file: &Path) -> Vec<Shown> {
     shown
 }
 
-/// The words of the commands in a shell line, without comments, redirections and assignments.
+/// Splits a shell line into the words of its commands, without comments, redirections and assignments.
 fn parts(line: &str) -> Vec<Vec<String>> {
     let mut parts = vec![Vec::new()];
     let (mut word, mut quote, mut quoted) = (String::new(), None, false);
@@ -124,7 +123,7 @@ fn ours(words: &[String]) -> Option<(&str, Vec<&str>)> {
     }
 }
 
-/// A directory in which documents' relative paths hold and results harm nobody.
+/// Creates a directory in which documents' relative paths are valid and results do no harm.
 fn playground() -> tempfile::TempDir {
     let directory = tempfile::tempdir().unwrap();
     for entry in fs::read_dir(workspace()).unwrap() {
@@ -158,7 +157,7 @@ fn commands_shown_are_understood() {
             _ => false,
         };
         for argument in arguments.iter().filter(|argument| argument.ends_with(".toml")) {
-            // a scene that the document lets its reader write
+            // a scene that the document asks its reader to write
             let is_example = !argument.contains('/');
             if !is_example && !playground.path().join(argument).is_file() {
                 faults.push(format!("{place}: there is no {argument}"));
@@ -166,7 +165,7 @@ fn commands_shown_are_understood() {
         }
         let missing_example = arguments.iter().any(|a| a.ends_with(".toml") && !a.contains('/'));
         let mut run = command(program, "", playground.path());
-        // arguments are parsed from left to right, and help ends the parsing before anything is run
+        // arguments are parsed from left to right, and help ends the parsing before a run
         let end = arguments.iter().position(|argument| *argument == "--").unwrap_or(arguments.len());
         run.args(&arguments[..end]);
         if !cheap || missing_example {
@@ -182,7 +181,7 @@ fn commands_shown_are_understood() {
     assert!(known >= 10, "only {known} commands were found");
 }
 
-/// Links and pictures of documents that do not lead to the web lead to files.
+/// Links and pictures of documents that do not lead to the web lead to existing files.
 #[test]
 fn links_lead_to_files() {
     let mut faults = Vec::new();

@@ -2,9 +2,8 @@
 //! checkpoints. No panic, no hang, no memory beyond what the file justifies, and an error that names the
 //! place.
 //!
-//! 2000 mutations of each kind, the same ones every time;
-//! `FRONT_DOOR=100000 cargo test --release -p tests front_door` takes that many, new ones every time. What it
-//! finds is kept in tests/proptest-regressions and tried first.
+//! 2000 mutations of each kind, always the same; `FRONT_DOOR=100000 cargo test --release -p tests front_door`
+//! takes that many new ones. Failures are kept in tests/proptest-regressions and tried first.
 
 use crate::allocations;
 use crate::bad::write_bad_scenes;
@@ -23,9 +22,9 @@ mod scenes;
 
 /// Mutations of each kind, unless `FRONT_DOOR` says otherwise.
 const FEW: u32 = 2000;
-/// Longer than any of these may take, on a busy machine.
+/// Time limit of each mutation, on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(5);
-/// Memory that opening a file may take: so much, and so many times its length.
+/// Memory that opening a file may take: a constant, and a multiple of its length.
 const MEMORY: [u64; 2] = [32 << 20, 256];
 /// Bytes taken of a larger file.
 const LARGEST: usize = 64 << 10;
@@ -138,7 +137,7 @@ fn apply(bytes: &mut Vec<u8>, change: &Change) {
     }
 }
 
-/// Damages files of a kind and opens them; an error must hold `name`, the place that a user has to look at.
+/// Damages files of a kind and opens them; an error must contain `name`, the place of the fault.
 fn attack(kind: &str, files: &[PathBuf], name: &str, open: impl Fn(&[u8]) -> Result<(), String>) {
     attack_some(1, kind, files, name, open);
 }
@@ -191,7 +190,7 @@ fn attack_some(
     }
 }
 
-/// Files below a folder of the workspace whose names end so.
+/// Lists files below a folder of the workspace whose names have the given ending.
 fn below(folder: &str, ending: &str) -> Vec<PathBuf> {
     let (mut found, mut folders) = (Vec::new(), vec![workspace().join(folder)]);
     while let Some(folder) = folders.pop() {
@@ -216,7 +215,7 @@ fn cases(program: &str) -> Vec<PathBuf> {
     files
 }
 
-/// Opens scenes given as a text by `open`.
+/// Opens scenes given as text by `open`.
 fn attack_scenes(files: &[PathBuf], open: impl Fn(&Source) -> Result<(), harness::scene::SceneError>) {
     attack("scene", files, "scene.toml", |bytes| {
         let source = Source::new("scene.toml", String::from_utf8_lossy(bytes).into_owned());
@@ -386,7 +385,7 @@ fn checkpoints() {
     harness::checkpoint::write(&path, MAGIC, &value).unwrap();
     attack_files("checkpoint", &[path], "checkpoint.bin", |path| {
         match harness::checkpoint::read::<Vec<(String, Vec<f64>)>>(path, MAGIC) {
-            // its checksum lets nothing through
+            // its checksum rejects every change
             Ok(read) if read != value => Err("a damaged checkpoint was read".to_owned()),
             Ok(_) => Ok(()),
             Err(error) => Err(error.to_string()),

@@ -9,10 +9,10 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// A program behind a limit of the shell.
+/// Runs a program behind a limit of the shell.
 fn limited(program: &str, arguments: &str, limit: &str, here: &Path) -> Ended {
     let mut shell = Command::new("sh");
-    // a file that is too large is an error of its write, as a full disk is, where the signal is ignored
+    // a file that is too large gives an error of its write, like a full disk, if the signal is ignored
     let script = format!("trap '' XFSZ; {limit} || exit 77; exec \"$0\" \"$@\"");
     shell.arg("-c").arg(script).arg(executable(program)).args(arguments.split_whitespace());
     shell.current_dir(here).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
@@ -29,7 +29,7 @@ fn rows() -> String {
     "C11,C22,C33,C12,C13,C23,S11,S22,S33,S12,S13,S23\n".to_owned() + &(0..20).map(row).collect::<String>()
 }
 
-/// Files of any size from none to all: the run fails with 1 and says which file has no room, or is whole.
+/// Files of any size from none to all: the run fails with 1 and names the file without space, or succeeds.
 #[test]
 fn no_room_on_the_disk() {
     let directory = tempfile::tempdir().unwrap();
@@ -71,7 +71,7 @@ fn no_room_on_the_disk() {
     assert!(fields > 0, "no file of fields was refused");
 }
 
-/// A mesh that fits into the machine and not into the process is refused before it is made.
+/// A mesh that fits into the machine but not into the process is refused before it is built.
 #[test]
 #[cfg(target_os = "linux")]
 fn memory_of_the_process() {
@@ -89,7 +89,7 @@ fn memory_of_the_process() {
     ended.tells("(the available memory)");
 }
 
-/// Begins a run and waits for a file of it.
+/// Begins a run and waits for one of its files.
 fn begun(program: &str, line: &str, file: &Path, here: &Path) -> Child {
     let mut child = command(program, line, here).spawn().unwrap();
     let since = Instant::now();
@@ -101,7 +101,7 @@ fn begun(program: &str, line: &str, file: &Path, here: &Path) -> Child {
     child
 }
 
-/// While a run writes into its folder a second one, a `resume` and a sweep are kept out, and spoil nothing.
+/// While a run writes into its folder, a second one, a `resume` and a sweep are refused, and damage nothing.
 #[test]
 fn one_run_at_a_time() {
     let directory = tempfile::tempdir().unwrap();
@@ -128,7 +128,7 @@ fn one_run_at_a_time() {
         assert!(here.join(file).is_file() && before > 0 && first.try_wait().unwrap().is_none(), "{line}");
         first.kill().unwrap();
         finish(first);
-        // the lock went with its process
+        // the lock ended with its process
         let mut next = command(program, again, here).spawn().unwrap();
         std::thread::sleep(Duration::from_millis(500));
         assert!(next.try_wait().unwrap().is_none(), "{again}");

@@ -3,7 +3,7 @@
 use crate::program::{executable, workspace};
 use std::process::Command;
 
-/// The packages that a crate is built with.
+/// Packages of a crate's build.
 fn tree(package: &str, flags: &[&str]) -> Vec<String> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let arguments =
@@ -14,7 +14,7 @@ fn tree(package: &str, flags: &[&str]) -> Vec<String> {
     text.lines().filter_map(|line| Some(line.split_whitespace().next()?.to_owned())).collect()
 }
 
-/// The siblings depend on `polycore` only, and the training framework is `mdsurrogate`'s alone.
+/// The siblings depend on `polycore` only, and only `mdsurrogate` on the training framework.
 #[test]
 fn no_crate_is_built_with_what_it_does_not_need() {
     let framework = |name: &String| name == "burn" || name.starts_with("burn-");
@@ -64,7 +64,7 @@ fn libraries_bring_no_shell() {
     }
 }
 
-/// A binary runs on any Linux of its age: it loads nothing but the C library and what comes with it.
+/// A binary runs on any Linux of its age: it loads nothing but the C library and its companions.
 #[cfg(target_os = "linux")]
 #[test]
 fn binaries_need_nothing_but_libc() {

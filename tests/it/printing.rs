@@ -1,4 +1,4 @@
-//! Paths that miss the part, gaps that stay empty, and values that cease to be finite.
+//! Tool paths that miss the part, gaps that stay empty, and values that cease to be finite.
 
 use crate::parts::BAR;
 use crate::program::{Ended, command, finish};
@@ -27,7 +27,7 @@ fn a_state_that_is_not_finite_ends_the_run() {
     ended.tells("error: alpha is not finite at node ");
     ended.tells(" mm, t = ");
     assert!(!here.join("out/report.json").exists());
-    // unless the scene asks for it, and then it must come
+    // except if the scene expects it, and then it must occur
     let study = |set: &str| {
         format!(
             "{scene}\n[[study]]\nname = \"as-coded\"\nexpect_error = \"alpha is not finite\"\nset = \

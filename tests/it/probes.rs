@@ -64,7 +64,7 @@ section = [
 ]
 "#;
 
-/// A table by its headings; an empty cell is `None`.
+/// Reads a table by its headings; an empty cell is `None`.
 fn table(path: &Path) -> BTreeMap<String, Vec<Option<f64>>> {
     let text = fs::read_to_string(path).unwrap();
     assert!(!text.contains("NaN"), "{text}");
@@ -134,7 +134,7 @@ fn lines_of_a_strip() {
         // outside of the body there is no value
         assert_eq!(u[k].is_none(), !(1..=41).contains(&k), "{at}");
     }
-    // both faces move with their grips, and all between follows
+    // both faces move with their grips, and everything between follows
     assert!(u[1].unwrap().abs() < 1e-15 && (u[41].unwrap() - 8e-3).abs() < 1e-15, "{u:?}");
     assert!(u[1..=41].windows(2).all(|pair| pair[0].unwrap() < pair[1].unwrap() + 1e-6), "{u:?}");
     assert_eq!(rows["damage"][5], Some(0.0));

@@ -1,4 +1,4 @@
-//! The Python package: built with all else, packed as a wheel, installed into an environment of its own, and
+//! The Python package: built with everything else, packed as a wheel, installed into its own environment, and
 //! tested there by pytest.
 
 use crate::program::{PACKAGES, executable, workspace};
@@ -10,12 +10,12 @@ use std::time::Instant;
 const NEEDED: [&str; 3] = ["maturin", "numpy", "pytest"];
 const USED: [&str; 4] = ["matplotlib", "mypy", "pandas", "xarray"];
 
-/// `lib_polymech.so`: built with the packages that the other tests build, so that features of dependencies
+/// Builds `lib_polymech.so` with the packages that the other tests build, so that features of dependencies
 /// are the same.
 fn library() -> PathBuf {
     let cargo = std::env::var_os("CARGO").unwrap_or("cargo".into());
     let mut command = Command::new(cargo);
-    // examples too: their dependencies choose features, and nothing is compiled twice
+    // examples too: their dependencies select features, and nothing is compiled twice
     command.args(["build", "--release", "--quiet", "--lib", "--bins", "--examples"]);
     command.arg("--message-format=json-render-diagnostics");
     command.args(PACKAGES.map(|package| format!("--package={package}"))).current_dir(workspace());
@@ -41,7 +41,7 @@ fn has(interpreter: &Path, modules: &[&str]) -> bool {
     passes(interpreter, &["-c", &format!("import {}", modules.join(", "))])
 }
 
-/// The interpreter of an environment with what is needed; what is missing on this machine otherwise.
+/// Returns the interpreter of an environment with the requirements, or the missing ones.
 fn environment() -> Result<PathBuf, &'static str> {
     let system = Path::new("python3");
     let recent = "import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 10))";
@@ -62,7 +62,7 @@ fn environment() -> Result<PathBuf, &'static str> {
     if !install(&NEEDED) {
         return Err("maturin, numpy and pytest, from PyPI");
     }
-    // pytest tells which of these it lacks
+    // pytest reports which of these are missing
     install(&USED);
     Ok(own)
 }

@@ -32,7 +32,7 @@ fn one_version_and_one_compiler() {
     }
 }
 
-/// Published crates carry both licences, and say what docs.rs builds.
+/// Published crates carry both licences, and settings of docs.rs.
 #[test]
 fn published_crates_are_complete() {
     let mut published = 0;
@@ -60,7 +60,7 @@ fn published_crates_are_complete() {
     assert_eq!(published, 8);
 }
 
-/// The archive holds programs, completions, man pages and terms; what it holds is what the programs say.
+/// The archive contains programs, completions, man pages and terms, in agreement with the programs.
 #[test]
 fn an_archive_for_this_system() {
     let directory = tempfile::tempdir().unwrap();
@@ -109,7 +109,7 @@ fn an_archive_for_this_system() {
     for place in ["README.md", "CHANGELOG.md", "CITATION.cff", "LICENSE-APACHE", "LICENSE-MIT"] {
         assert!(places.contains(place), "no {place}");
     }
-    // what the image takes from it
+    // files that the image takes from it
     for place in read("Dockerfile").split_whitespace().filter_map(|word| word.strip_prefix("/archive/")) {
         assert!(places.iter().any(|found| found.starts_with(place)), "Dockerfile: no {place}");
     }

@@ -4,7 +4,7 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// `report.json` of an output directory.
+/// Reads `report.json` of an output directory.
 #[track_caller]
 pub fn report(directory: &Path) -> Value {
     let path = directory.join("report.json");
@@ -12,7 +12,7 @@ pub fn report(directory: &Path) -> Value {
     serde_json::from_str(&text).unwrap()
 }
 
-/// A scalar of a report.
+/// Returns a scalar of a report.
 #[track_caller]
 pub fn scalar(report: &Value, name: &str) -> f64 {
     report["values"][name]["value"]
@@ -73,7 +73,7 @@ fn without_times(mut report: Value) -> String {
     format!("{report:#}")
 }
 
-/// The table without its column `run_time [s]`.
+/// Removes the column `run_time [s]` from a table.
 fn without_run_time(table: &str) -> String {
     let times = table.lines().next().unwrap().split(',').position(|head| head.ends_with("[s]")).unwrap();
     let kept = |line: &str| {
@@ -83,7 +83,7 @@ fn without_run_time(table: &str) -> String {
     table.lines().map(kept).collect::<Vec<_>>().join("\n")
 }
 
-/// Asserts that two output directories hold the same files with the same bytes, times aside.
+/// Asserts that two output directories contain the same files with the same bytes, except for times.
 #[track_caller]
 pub fn assert_same(a: &Path, b: &Path) {
     let (a, b) = (timeless(a), timeless(b));

@@ -1,4 +1,4 @@
-//! G-code as slicers write it: right values of small prints, and what `check` says of them.
+//! G-code as slicers write it: correct values of small prints, and the messages of `check`.
 
 use crate::program::{Ended, command, finish};
 use crate::results::{report, scalar};
@@ -10,13 +10,13 @@ fn crystfem(arguments: &str, here: &Path) -> Ended {
     finish(command("crystfem", arguments, here).spawn().unwrap())
 }
 
-/// Filament, mm, of a bead of some mm³.
+/// Filament, mm, for a bead of a volume in mm³.
 fn filament(volume: f64) -> f64 {
     volume / (0.25 * PI * 1.75f64.powi(2))
 }
 
-/// A scene on `part.gcode`, with cells of a height, mm, more keys of its mesh, a film, and whether it lies on
-/// a bed of 60 °C.
+/// Formats a scene for `part.gcode`, with the height of its cells, mm, more keys of its mesh, a film, and
+/// whether it lies on a bed of 60 °C.
 fn scene(height: f64, keys: &str, film: &str, bed: bool, end: f64) -> String {
     let bed = match bed {
         true => "[[boundary]]\nsurface = \"bottom\"\nfilm = \"500 W/(m^2 K)\"\nambient = \"60 degC\"\n",
@@ -88,7 +88,7 @@ fn right_values() {
             wrong.push(format!("{name}: {found}, right {right} ± {tolerance}"));
         }
     };
-    // heights: of a purge line at another height, of a support with layers of its own
+    // heights: of a purge line at another height, of a support with its own layers
     let top = scene(0.1, "", STILL, true, 60.0) + &probe("\"5 mm\", \"5 mm\", \"0.85 mm\"");
     let found = run("purge", &purge(), &top);
     judge("purge: cells_over_body", scalar(&found, "cells_over_body"), 1.0950, 5e-5);
@@ -111,7 +111,7 @@ fn right_values() {
                  E0\nM109 S200\nM104 T0 S175\nG1 X10 Y1\nG1 X0 E0.4\n";
     let found = run("tools", tools, &scene(0.2, "", STILL, false, 60.0));
     judge("tools: birth_energy", scalar(&found, "birth_energy"), 2.1073, 5e-5);
-    // the second tool lays something of twice the density
+    // the second tool prints a material of twice the density
     let dense = "[materials.dense]\nlaw = \"conductor\"\ndensity = \"2480 kg/m^3\"\nconductivity = \"0.13 \
                  W/(m K)\"\nspecific_heat = \"1800 J/(kg K)\"\n\
                  [[region]]\nelements = \"tool-1\"\nmaterial = \"dense\"\ntemperature = \"25 degC\"\n";
@@ -170,7 +170,7 @@ fn check_tells_what_a_file_prints() {
     // cooled in 100 s with a constant of 10 s
     let cold = "{ file = \"part.gcode\", of = \"bed\", cools_to = \"20 degC\", cooling_time = \"10 s\" }";
     assert!(!check("", cold).with_code(0).stdout.contains("lets the part cool"));
-    // a piece in the air
+    // a piece without contact to the bed
     let loose = format!(
         "M83\nM104 S210\n;TYPE:Perimeter\nG1 Z.2 F600\nG1 X10 E{e}\n;TYPE:Support\n;HEIGHT:0.2\nG1 Z5\nG1 \
          X0 E{e}\n"

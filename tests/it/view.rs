@@ -1,4 +1,4 @@
-//! The page that `view` writes: what it holds, and that a browser shows it, without a network.
+//! The page that `view` writes: its content, and that a browser shows it without a network.
 
 use crate::browser::Browser;
 use crate::parts::BAR;
@@ -46,7 +46,7 @@ every = 2
 pictures = false
 "#;
 
-/// Longer pages load slowly and cannot be mailed.
+/// Largest size of a page, bytes: longer ones load slowly and cannot be mailed.
 const MOST: usize = 5_000_000;
 
 fn run(program: &str, arguments: &str, here: &Path) -> Ended {
@@ -59,12 +59,12 @@ fn told(page: &str) -> Value {
     serde_json::from_str(rest.split_once("</script>").unwrap().0).unwrap()
 }
 
-/// The values of data that the page keeps of what it shows.
+/// Values of the data that the page shows.
 fn shown(browser: &Browser, name: &str) -> String {
     browser.value(&format!("document.body.dataset.{name} ?? ''")).as_str().unwrap().to_owned()
 }
 
-/// Chooses an entry of a list by its beginning, as a user does.
+/// Selects an entry of a list by its beginning, as a user does.
 fn choose(browser: &Browser, id: &str, entry: &str) {
     let set = format!(
         "(() => {{ const list = document.getElementById('{id}'); \
@@ -74,7 +74,7 @@ fn choose(browser: &Browser, id: &str, entry: &str) {
     assert!(browser.value(&set).as_i64().unwrap() >= 0, "no {entry} in {id}");
 }
 
-/// The page of a run that tears: rendered, turned, cut, stepped by slider, key, click and play, by mouse and
+/// The page of a run that tears: rendered, rotated, cut, stepped by slider, key, click and play, by mouse and
 /// by fingers.
 #[test]
 fn a_sheet_that_tears() {
@@ -101,7 +101,7 @@ fn a_sheet_that_tears() {
     assert_eq!(shown(&browser, "step"), (frames.len() - 1).to_string(), "it begins at the end");
     assert_eq!(shown(&browser, "triangles"), (2 * cells).to_string());
     browser.picture("sheet-end.txt");
-    // the first step by key, and the marker on the curve goes along
+    // the first step by key; the marker on the curve follows
     let last = shown(&browser, "mark");
     browser.press("#step", "\u{e011}");
     browser.wait("document.body.dataset.step === '0'");
@@ -138,7 +138,7 @@ fn a_sheet_that_tears() {
     let whole = ends(&browser);
     browser.click("#own-range");
     browser.wait(&format!("document.body.dataset.high !== '{}'", whole[1]));
-    // a turn by the mouse and one by a finger, and two fingers for nearer
+    // a rotation by the mouse and one by a finger, and two fingers to zoom
     let eye = "JSON.stringify(document.getElementById('stage')._fullLayout.scene._scene.getCamera().eye)";
     let size = "document.getElementById('stage')._fullLayout.scene.aspectratio.y";
     let before = browser.value(eye);
@@ -156,7 +156,7 @@ fn a_sheet_that_tears() {
     let near = browser.value(size).as_f64().unwrap();
     browser.drag("touch", &[[[x - 20.0, y], [x - 140.0, y]], [[x + 20.0, y], [x + 140.0, y]]]);
     browser.wait(&format!("{size} > {}", 1.5 * near));
-    // play to the end, and its button shows that it rests
+    // play to the end; its button shows that it stopped
     browser.press("#step", "\u{e011}");
     browser.wait("document.body.dataset.step === '0'");
     browser.click("#play");
@@ -166,7 +166,7 @@ fn a_sheet_that_tears() {
     assert_eq!(browser.requests(), Vec::<String>::new());
 }
 
-/// The page of a print on a telephone: layers come, the cut shows the inside, probes over time choose the
+/// The page of a print on a telephone: layers appear, the cut shows the inside, probes over time select the
 /// step.
 #[test]
 fn a_print_on_a_small_screen() {
@@ -226,7 +226,7 @@ fn what_there_is_is_shown_or_named() {
     run("polycore", "view curves", here).with_code(0);
     let page = fs::read_to_string(here.join("curves/view.html")).unwrap();
     assert_eq!(told(&page)["tables"][0]["columns"][1]["data"], serde_json::json!([0.0, null, null, 1.0]));
-    // a run under way, and one with nothing yet
+    // a run in progress, and one without any file
     fs::write(here.join("sheet.toml"), SHEET.replace("steps = 30", "steps = 3000")).unwrap();
     let mut child = command("peri", "run sheet.toml --output half", here).spawn().unwrap();
     let written = || {

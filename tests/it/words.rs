@@ -32,7 +32,7 @@ fn slips_are_reported() {
     let told = crystfem("check cold.toml", here).with_code(0);
     told.shows("note       `boundary[1].ambient` is 60 K, which is -213.15 °C: is `degC` meant?");
     told.shows("builds     a mesh that reaches from (-12, -6, -2) mm to (12, 6, 1.5) mm");
-    // a leg that is a jump
+    // a segment that is a jump
     write(
         "point.toml",
         "version = 1\nprogram = \"crystfem\"\n[material]\nlaw = \"semicrystalline\"\ndensity = \"1010 \
@@ -80,7 +80,7 @@ fn a_mesh_without_its_unit() {
     crystfem("check part.toml", here).with_code(0).shows("reaches from (0, 0, 0) mm to (60, 10, 6) mm");
 }
 
-/// A screen holds what is said of a run; the file has all.
+/// The terminal shows a screenful of messages of a run; the file has all.
 #[test]
 fn few_lines() {
     let directory = tempfile::tempdir().unwrap();
@@ -92,8 +92,7 @@ fn few_lines() {
     ended.shows(" more values in report.json");
 }
 
-/// Values of layers and what is expected of each run in the table of a sweep, which a shorter sweep does not
-/// lose.
+/// Values of layers and the expectations of each run in the table of a sweep, which a shorter sweep keeps.
 #[test]
 fn columns_of_a_sweep() {
     let directory = tempfile::tempdir().unwrap();
@@ -131,8 +130,8 @@ fn columns_of_a_sweep() {
     assert_eq!(sweep("12s").lines().count(), 2);
 }
 
-/// Bisection by runs: the answer meets what is expected, a hundredth of the interval less does not, and all
-/// is in the table.
+/// Bisection by runs: the answer meets the expectations, a hundredth of the interval less does not, and all
+/// runs are in the table.
 #[test]
 fn the_least_value_that_passes() {
     let directory = tempfile::tempdir().unwrap();

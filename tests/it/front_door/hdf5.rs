@@ -16,8 +16,8 @@ fn table(rows: usize) -> String {
     text
 }
 
-/// Files as this project writes them, with and without a split, and as others might: C and S alone, in the
-/// format of HDF5 1.8 and in that of 1.6, whole and in packed chunks.
+/// Files as this project writes them, with and without a split, and of other origin: C and S alone, in the
+/// formats of HDF5 1.8 and 1.6, contiguous and in compressed chunks.
 fn data_sets(folder: &Path) -> Vec<PathBuf> {
     let csv = folder.join("a.csv");
     fs::write(&csv, table(6)).unwrap();

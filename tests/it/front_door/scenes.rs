@@ -5,16 +5,16 @@ use crate::{parts, scenes};
 use harness::scene::{Failure, Source};
 use std::path::{Path, PathBuf};
 
-/// Larger bodies and meshes are judged, not built.
+/// Size above which bodies and meshes are checked, not built.
 const LARGEST: f64 = 4e6;
 const MOST_ELEMENTS: f64 = 4e3;
-/// Building takes milliseconds: one of so many mutations is tried.
+/// Share of mutations that are built, which takes milliseconds.
 const SHARE: u32 = 20;
 
 fn told<E: std::error::Error>(failure: Failure<E>) -> String {
     match failure {
         Failure::Scene(error) => error.render(),
-        // faults of what is solved name themselves
+        // errors of a solution name themselves
         Failure::Run(error) => format!("scene.toml: {error}"),
     }
 }
@@ -82,7 +82,7 @@ fn parts_of_crystfem() {
     });
 }
 
-/// Kinetics and fits, with the tables beside them.
+/// Kinetics and fits, with their tables.
 #[test]
 fn points_and_fits_of_crystfem() {
     use crystfem::program::scene::{Kind, kind};
