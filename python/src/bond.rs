@@ -137,7 +137,7 @@ impl Sampled {
 
     /// Returns tension (0), its derivative (1) or the energy (2) at a stretch; beyond the samples along the
     /// tangent at their end.
-    fn at(&self, what: usize, stretch: f64) -> f64 {
+    fn value(&self, what: usize, stretch: f64) -> f64 {
         let (low, high) = (self.ends[0], self.ends[2 * PANELS]);
         let inside = stretch.clamp(low, high);
         let panel = self.ends.partition_point(|end| *end <= inside).saturating_sub(1).min(2 * PANELS - 1);
@@ -157,13 +157,13 @@ impl Sampled {
 
 impl BondPotential for Sampled {
     fn tension(&self, stretch: f64) -> f64 {
-        self.at(0, stretch)
+        self.value(0, stretch)
     }
     fn tension_derivative(&self, stretch: f64) -> f64 {
-        self.at(1, stretch)
+        self.value(1, stretch)
     }
     fn energy(&self, stretch: f64) -> f64 {
-        self.at(2, stretch)
+        self.value(2, stretch)
     }
     fn is_stress_free(&self) -> bool {
         self.stress_free
@@ -222,7 +222,7 @@ impl BondLaw {
         stretch: PyReadonlyArray1<'py, f64>,
     ) -> PyResult<[Bound<'py, PyArray1<f64>>; 3]> {
         let stretch = stretch.as_slice()?;
-        let each = |what: usize| stretch.iter().map(|&l| self.law.at(what, l)).collect::<Vec<f64>>();
+        let each = |what: usize| stretch.iter().map(|&l| self.law.value(what, l)).collect::<Vec<f64>>();
         Ok([0, 1, 2].map(|what| each(what).into_pyarray(py)))
     }
 }

@@ -23,7 +23,7 @@ pyo3::create_exception!(
     polymech,
     Interrupted,
     RunError,
-    "A run that was stopped. Its checkpoint is in the folder `output`, from which `resume` continues."
+    "A run that was stopped. Its checkpoint is in the folder `output`; `resume` continues it."
 );
 
 /// Creates the exception of a run that failed; `output` is its folder.

@@ -36,18 +36,18 @@ pub fn langevin<'py>(
     })?;
     let x = x.as_slice()?;
     let work = || match function {
-        "langevin" => Some(each(x, chain::langevin)),
-        "derivative" => Some(each(x, chain::derivative)),
-        "free_energy" => Some(each(x, chain::free_energy)),
-        "inverse" => Some(each(x, |x| known.value(x))),
-        "inverse_derivative" => Some(each(x, |x| known.derivative(x))),
+        "langevin" => Some(evaluate(x, chain::langevin)),
+        "derivative" => Some(evaluate(x, chain::derivative)),
+        "free_energy" => Some(evaluate(x, chain::free_energy)),
+        "inverse" => Some(evaluate(x, |x| known.value(x))),
+        "inverse_derivative" => Some(evaluate(x, |x| known.derivative(x))),
         _ => None,
     };
-    let found = py.detach(|| pool::here(work))?;
+    let found = py.detach(|| pool::in_pool(work))?;
     found.map(|found| found.into_pyarray(py)).ok_or_else(|| value(format!("no function {function}")))
 }
 
-fn each(x: &[f64], function: impl Fn(f64) -> f64 + Sync) -> Vec<f64> {
+fn evaluate(x: &[f64], function: impl Fn(f64) -> f64 + Sync) -> Vec<f64> {
     if x.len() < MANY {
         return x.iter().map(|&x| function(x)).collect();
     }

@@ -76,7 +76,7 @@ trait AnyBody: Send + Sync {
 
 type BondSimulation<const D: usize> = model::Simulation<D, BondMaterial<'static>>;
 
-fn stopped() -> Error {
+fn interruption() -> Error {
     Error::Shared(polycore::Error::Interrupted { program: "peri", output: Default::default() })
 }
 
@@ -88,7 +88,8 @@ impl<const D: usize> AnyBody for BondSimulation<D> {
     fn solve(&mut self, method: SolverChoice, line: &RunLink<'_>) -> Result<(), Error> {
         let sites: Vec<usize> = self.bonds.particles().iter().map(|&site| site as usize).collect();
         let positions = line.wants_steps().then(|| self.positions());
-        let watch = |_: &Status| if line.stop().load(Ordering::Relaxed) { Err(stopped()) } else { Ok(()) };
+        let watch =
+            |_: &Status| if line.stop().load(Ordering::Relaxed) { Err(interruption()) } else { Ok(()) };
         let finished = |state: &State<D>| {
             let (Some(positions), Some(record)) = (&positions, state.history.last()) else { return Ok(()) };
             if state.control.round > 0 {
@@ -100,7 +101,7 @@ impl<const D: usize> AnyBody for BondSimulation<D> {
                 values: Record::SCALARS.map(|(name, unit, get)| (name, unit, get(record))).to_vec(),
                 fields: vec![field("position", positions.clone()), field("displacement", displacement)],
             };
-            if line.step(step) { Ok(()) } else { Err(stopped()) }
+            if line.step(step) { Ok(()) } else { Err(interruption()) }
         };
         match method {
             SolverChoice::Lbfgs(method) => self.solve_watched(method, watch, finished),
@@ -195,7 +196,7 @@ impl Simulation {
         threads: Option<usize>,
         on_step: Option<Py<PyAny>>,
     ) -> PyResult<bool> {
-        let method = solver(method, settings)?;
+        let method = parse_method(method, settings)?;
         let watchers = Watchers { progress: None, on_step };
         let body = &mut self.body;
         match watched(py, &watchers, threads, |line| body.solve(method, &line))? {
@@ -249,7 +250,7 @@ impl Simulation {
             value(format!("measure: found {measure:?}; allowed: {}", names.join(", ")))
         })?;
         let found =
-            py.detach(|| pool::here(|| self.body.stress(which, known)))?.map_err(|error| fault(&error))?;
+            py.detach(|| pool::in_pool(|| self.body.stress(which, known)))?.map_err(|error| fault(&error))?;
         let d = self.body.dimension();
         let count = found.len() / (d * d);
         found.into_pyarray(py).reshape(vec![count, d, d])
@@ -357,7 +358,7 @@ where
         };
         let raised = raised.clone();
         let inside = move |points: &[[f64; D]]| {
-            asked(&region, points).map_err(|error| {
+            select_points(&region, points).map_err(|error| {
                 if let Ok(mut raised) = raised.lock() {
                     raised.get_or_insert(error);
                 }
@@ -370,7 +371,7 @@ where
 }
 
 /// Selects the points for which a function of Python returns true.
-fn asked<const D: usize>(region: &Py<PyAny>, points: &[[f64; D]]) -> PyResult<Vec<bool>> {
+fn select_points<const D: usize>(region: &Py<PyAny>, points: &[[f64; D]]) -> PyResult<Vec<bool>> {
     Python::attach(|py| {
         let flat: Vec<f64> = points.iter().flatten().copied().collect();
         let points = flat.into_pyarray(py).reshape([points.len(), D])?;
@@ -416,7 +417,7 @@ impl InSpace for Body<3> {
 }
 
 /// Creates a method from its name and some of its settings.
-fn solver(name: &str, mut settings: HashMap<String, f64>) -> PyResult<SolverChoice> {
+fn parse_method(name: &str, mut settings: HashMap<String, f64>) -> PyResult<SolverChoice> {
     let mut take = |name: &str, default: f64| settings.remove(name).unwrap_or(default);
     let method = match name {
         "lbfgs" => {
@@ -453,6 +454,6 @@ fn solver(name: &str, mut settings: HashMap<String, f64>) -> PyResult<SolverChoi
     };
     match settings.keys().next() {
         None => Ok(method),
-        Some(other) => Err(value(format!("setting: found {other:?}, which `{name}` has not"))),
+        Some(other) => Err(value(format!("unexpected setting {other:?}: `{name}` has no such setting"))),
     }
 }

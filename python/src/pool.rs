@@ -45,7 +45,7 @@ pub fn forked() -> PyResult<Option<Arc<rayon::ThreadPool>>> {
 ///
 /// # Errors
 /// As [`forked`].
-pub fn here<T: Send>(work: impl FnOnce() -> T + Send) -> PyResult<T> {
+pub fn in_pool<T: Send>(work: impl FnOnce() -> T + Send) -> PyResult<T> {
     Ok(match forked()? {
         Some(pool) => pool.install(work),
         None => work(),

@@ -74,7 +74,7 @@ fn resume_of<C: Case>(py: Python<'_>, how: RunOptions) -> PyResult<(String, Stri
     if !there(harness::checkpoint::FILE_NAME) && there(harness::report::FILE_NAME) {
         let report =
             Report::read(output.join(harness::report::FILE_NAME)).map_err(|e| crate::error::file(&e))?;
-        return told(&report.clone().into());
+        return describe(&report.clone().into());
     }
     let header = Header::read(output, C::PROGRAM.magic)
         .and_then(|header| header.check(output).map(|()| header))
@@ -97,12 +97,12 @@ fn run_of<C: Case>(
             true => source,
             false => case::attached::<C::Error>(source, output, *quick, inputs, false)?,
         };
-        go::<C>(&source, output, (*quick, resume, every), line)
+        run_with::<C>(&source, output, (*quick, resume, every), line)
     })?;
-    told(&finished.map_err(|error| failure(py, error, output))?)
+    describe(&finished.map_err(|error| failure(py, error, output))?)
 }
 
-fn go<C: Case>(
+fn run_with<C: Case>(
     source: &Source,
     output: &Path,
     (quick, resume, checkpoint_every): (bool, bool, Duration),
@@ -124,7 +124,7 @@ fn go<C: Case>(
     case::run::<C>(source, options)
 }
 
-fn told(finished: &Finished) -> PyResult<(String, String)> {
+fn describe(finished: &Finished) -> PyResult<(String, String)> {
     let report = serde_json::to_string(&finished.report).map_err(crate::error::value)?;
     Ok((report, finished.text.clone()))
 }
@@ -196,19 +196,19 @@ fn sweep_of<C: Case>(
         };
         case::sweep::<C>(&source, &vary, &mut options)
     })?;
-    told(&finished.map_err(|error| failure(py, error, output))?)
+    describe(&finished.map_err(|error| failure(py, error, output))?)
 }
 
 /// Returns the JSON Schema of a program's scenes.
 #[pyfunction]
 pub fn schema(program: &str) -> PyResult<String> {
-    fn of<C: Case>() -> PyResult<String>
+    fn schema_of<C: Case>() -> PyResult<String>
     where
         C::Error: Fault,
     {
         Ok(C::schema().to_string())
     }
-    of_program!(program, of())
+    of_program!(program, schema_of())
 }
 
 /// Creates the page of a run in a folder, as HTML.

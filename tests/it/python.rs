@@ -37,7 +37,7 @@ fn passes(interpreter: &Path, arguments: &[&str]) -> bool {
 }
 
 /// Returns true if the modules can be imported.
-fn has(interpreter: &Path, modules: &[&str]) -> bool {
+fn can_import(interpreter: &Path, modules: &[&str]) -> bool {
     passes(interpreter, &["-c", &format!("import {}", modules.join(", "))])
 }
 
@@ -57,7 +57,7 @@ fn environment() -> Result<PathBuf, &'static str> {
     let install = |packages: &[&str]| {
         let pip =
             ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--retries=1", "--timeout=20"];
-        has(&own, packages) || passes(&own, &[&pip[..], packages].concat())
+        can_import(&own, packages) || passes(&own, &[&pip[..], packages].concat())
     };
     if !install(&NEEDED) {
         return Err("maturin, numpy and pytest, from PyPI");

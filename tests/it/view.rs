@@ -54,13 +54,13 @@ fn run(program: &str, arguments: &str, here: &Path) -> Ended {
 }
 
 /// Returns the data of a page.
-fn told(page: &str) -> Value {
+fn page_data(page: &str) -> Value {
     let (_, rest) = page.split_once("<script type=\"application/json\" id=\"run\">").unwrap();
     serde_json::from_str(rest.split_once("</script>").unwrap().0).unwrap()
 }
 
 /// Values of the data that the page shows.
-fn shown(browser: &Browser, name: &str) -> String {
+fn shown_values(browser: &Browser, name: &str) -> String {
     browser.value(&format!("document.body.dataset.{name} ?? ''")).as_str().unwrap().to_owned()
 }
 
@@ -86,7 +86,7 @@ fn a_sheet_that_tears() {
     ended.shows("view.html: open it in a browser");
     let page = fs::read_to_string(here.join("out/view.html")).unwrap();
     assert!(page.len() < MOST, "{} characters", page.len());
-    let told = told(&page);
+    let told = page_data(&page);
     let body = &told["bodies"][0];
     let frames = body["frames"].as_array().unwrap();
     assert!(frames.len() >= 15 && body["cells"][0]["kind"] == 9, "{body:#}");
@@ -98,20 +98,20 @@ fn a_sheet_that_tears() {
 
     let Some(browser) = Browser::open(&here.join("out/view.html"), [1400, 1000]) else { return };
     browser.wait("document.body.dataset.ready");
-    assert_eq!(shown(&browser, "step"), (frames.len() - 1).to_string(), "it begins at the end");
-    assert_eq!(shown(&browser, "triangles"), (2 * cells).to_string());
+    assert_eq!(shown_values(&browser, "step"), (frames.len() - 1).to_string(), "it begins at the end");
+    assert_eq!(shown_values(&browser, "triangles"), (2 * cells).to_string());
     browser.picture("sheet-end.txt");
     // the first step by key; the marker on the curve follows
-    let last = shown(&browser, "mark");
+    let last = shown_values(&browser, "mark");
     browser.press("#step", "\u{e011}");
     browser.wait("document.body.dataset.step === '0'");
-    assert_ne!(shown(&browser, "mark"), last);
+    assert_ne!(shown_values(&browser, "mark"), last);
     browser.press("#step", "\u{e014}\u{e014}");
     browser.wait("document.body.dataset.step === '2'");
     let moment = browser.value("document.getElementById('moment').textContent");
     assert!(moment.as_str().unwrap().contains("displacement"), "{moment}");
     // the marker lies on the row of its step: the displacement of the frame
-    let mark: Value = serde_json::from_str(&shown(&browser, "mark")).unwrap();
+    let mark: Value = serde_json::from_str(&shown_values(&browser, "mark")).unwrap();
     let displacement = frames[2]["displacement"].as_f64().unwrap();
     assert!((mark[0][0].as_f64().unwrap() - displacement).abs() < 1e-5, "{mark} {displacement}");
     // a click on the peak of the curve
@@ -128,10 +128,10 @@ fn a_sheet_that_tears() {
     let there = place(&browser, 19);
     browser.drag("mouse", &[[there, there]]);
     browser.wait("document.body.dataset.step !== '2'");
-    let step: usize = shown(&browser, "step").parse().unwrap();
+    let step: usize = shown_values(&browser, "step").parse().unwrap();
     assert!((frames[step]["time"].as_f64().unwrap() - 20.0).abs() <= 1.0, "step {step}");
     // colours
-    let ends = |browser: &Browser| [shown(browser, "low"), shown(browser, "high")];
+    let ends = |browser: &Browser| [shown_values(browser, "low"), shown_values(browser, "high")];
     let damage = ends(&browser);
     choose(&browser, "fields", "cauchy_hardy 22");
     browser.wait(&format!("document.body.dataset.high !== '{}'", damage[1]));
@@ -180,7 +180,7 @@ fn a_print_on_a_small_screen() {
     let Some(browser) = Browser::open(&here.join("page.html"), [420, 860]) else { return };
     browser.wait("document.body.dataset.ready");
     browser.picture("print-end.txt");
-    let triangles = |browser: &Browser| shown(browser, "triangles").parse::<usize>().unwrap();
+    let triangles = |browser: &Browser| shown_values(browser, "triangles").parse::<usize>().unwrap();
     let whole = triangles(&browser);
     browser.press("#step", "\u{e011}");
     browser.wait("document.body.dataset.step === '0'");
@@ -202,7 +202,11 @@ fn a_print_on_a_small_screen() {
     // probes
     let traces = browser.value("document.getElementById('chart').data.length").as_u64().unwrap();
     assert!(traces >= 2, "a probe and the marker");
-    assert!(shown(&browser, "mark").contains("120"), "the marker is at the end: {}", shown(&browser, "mark"));
+    assert!(
+        shown_values(&browser, "mark").contains("120"),
+        "the marker is at the end: {}",
+        shown_values(&browser, "mark")
+    );
     assert_eq!(browser.complaints(), Vec::<Value>::new());
     assert_eq!(browser.requests(), Vec::<String>::new());
 }
@@ -225,7 +229,10 @@ fn what_there_is_is_shown_or_named() {
     fs::write(here.join("curves/point_a&b.csv"), "time [s],alpha </script>\n0,0\n1,\n2,NaN\n3,1\n").unwrap();
     run("polycore", "view curves", here).with_code(0);
     let page = fs::read_to_string(here.join("curves/view.html")).unwrap();
-    assert_eq!(told(&page)["tables"][0]["columns"][1]["data"], serde_json::json!([0.0, null, null, 1.0]));
+    assert_eq!(
+        page_data(&page)["tables"][0]["columns"][1]["data"],
+        serde_json::json!([0.0, null, null, 1.0])
+    );
     // a run in progress, and one without any file
     fs::write(here.join("sheet.toml"), SHEET.replace("steps = 30", "steps = 3000")).unwrap();
     let mut child = command("peri", "run sheet.toml --output half", here).spawn().unwrap();
@@ -245,7 +252,7 @@ fn what_there_is_is_shown_or_named() {
     child.wait().unwrap();
     peri("view half", here).with_code(0);
     let page = fs::read_to_string(here.join("half/view.html")).unwrap();
-    let half = told(&page);
+    let half = page_data(&page);
     assert!(half["unfinished"] == true && half["bodies"][0]["frames"].as_array().unwrap().len() >= 3);
     fs::create_dir(here.join("begun")).unwrap();
     fs::write(here.join("begun/checkpoint.bin"), "x").unwrap();

@@ -65,7 +65,7 @@ impl Repository {
         let package = self.package(program).filter(|_| !program.is_empty() && program.chars().all(plain));
         let Some(package) = package else {
             let known = self.programs().join(", ");
-            return Err(miette!("there is no program `{program}` in crates/ (there are: {known})"));
+            return Err(miette!("unknown program `{program}`; programs: {known}"));
         };
         if !self.cargo(&["build", "--release", "--quiet", "--package", &package], &[], &[])? {
             return Err(miette!("`cargo build --release --package {package}` failed"));
@@ -77,7 +77,7 @@ impl Repository {
     pub fn bench(&self, package: &str) -> Result<PathBuf> {
         let known: Vec<String> = self.programs().into_iter().filter(|name| self.measures(name)).collect();
         if !known.iter().any(|name| name == package) {
-            return Err(miette!("there is no bench `{package}` (there are: {})", known.join(", ")));
+            return Err(miette!("unknown bench `{package}`; benches: {}", known.join(", ")));
         }
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| OsString::from("cargo"));
         let output = Command::new(cargo)

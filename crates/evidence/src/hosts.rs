@@ -7,7 +7,7 @@ use std::process::Command;
 
 /// Returns true if a program is installed; otherwise records that the test is skipped.
 #[track_caller]
-pub fn there(program: &str) -> bool {
+pub fn has_program(program: &str) -> bool {
     let found = Command::new(program).arg("--version").output().is_ok_and(|output| output.status.success());
     if !found {
         skipped(program);
@@ -57,7 +57,7 @@ pub fn calculix() -> Option<PathBuf> {
         skipped("CalculiX built from source (CALCULIX_SOURCE names the folder of ccx_2.20.a)");
         return None;
     }
-    if there("gfortran") { found } else { None }
+    if has_program("gfortran") { found } else { None }
 }
 
 /// Links CalculiX with a material, which stands before the archive: its empty routines stay unless `symbols`

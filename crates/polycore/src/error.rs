@@ -15,7 +15,7 @@ pub const EXIT_INTERRUPTED: u8 = 130;
 #[non_exhaustive]
 pub enum Error {
     /// The operating system refused an operation on a file.
-    #[error("cannot {operation} {}: {}{source}", path.display(), plainly(source))]
+    #[error("cannot {operation} {}: {}{source}", path.display(), explanation(source))]
     Io {
         /// A verb: `create`, `rename`, …
         operation: &'static str,
@@ -110,7 +110,7 @@ pub enum Error {
 }
 
 /// Returns a plain explanation of an error that the user can act on, to precede the system's text.
-fn plainly(error: &io::Error) -> &'static str {
+fn explanation(error: &io::Error) -> &'static str {
     match error.kind() {
         io::ErrorKind::StorageFull => "the disk is full: ",
         io::ErrorKind::QuotaExceeded => "the disk quota is exhausted: ",
@@ -122,7 +122,7 @@ fn plainly(error: &io::Error) -> &'static str {
 /// Returns true if a file could not be written for lack of space, which is no fault of the input.
 #[cfg(feature = "files")]
 pub(crate) fn no_room(error: &io::Error) -> bool {
-    !plainly(error).is_empty()
+    !explanation(error).is_empty()
 }
 
 impl Error {

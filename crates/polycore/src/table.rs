@@ -31,7 +31,7 @@ pub use layout::{Decimal, Layout, Separator};
 
 /// Error of reading a table.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{}{}: {what}: found {found:?}; allowed: {allowed}", path.display(), place(*line))]
+#[error("{}{}: {what}: found {found:?}; allowed: {allowed}", path.display(), location(*line))]
 pub struct Error {
     /// The file.
     pub path: PathBuf,
@@ -45,7 +45,7 @@ pub struct Error {
     pub allowed: String,
 }
 
-fn place(line: usize) -> String {
+fn location(line: usize) -> String {
     if line == 0 { String::new() } else { format!(":{line}") }
 }
 

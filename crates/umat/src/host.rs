@@ -18,13 +18,13 @@ thread_local! {
     static LAST: RefCell<Option<CachedMaterial>> = const { RefCell::new(None) };
 }
 
-fn with<R>(name: &[u8], constants: &[f64], work: impl FnOnce(&Material) -> R) -> R {
+fn with_material<R>(name: &[u8], constants: &[f64], work: impl FnOnce(&Material) -> R) -> R {
     LAST.with_borrow_mut(|last| {
         let (.., material) = match last.take() {
             Some(kept) if kept.0 == name && kept.1 == constants => last.insert(kept),
             _ => {
                 let made = Material::new(&String::from_utf8_lossy(name), constants);
-                let made = made.unwrap_or_else(|error| end(&error));
+                let made = made.unwrap_or_else(|error| abort(&error));
                 last.insert((name.to_vec(), constants.to_vec(), made))
             }
         };
@@ -33,14 +33,14 @@ fn with<R>(name: &[u8], constants: &[f64], work: impl FnOnce(&Material) -> R) ->
 }
 
 /// Ends the process: a host cannot continue, and no Fortran routine returns an error.
-fn end(message: &Error) -> ! {
+fn abort(message: &Error) -> ! {
     eprintln!("{message}");
     std::process::exit(2)
 }
 
 fn states(found: usize) {
     if found < Print::STATES {
-        end(&Error::new("state variables (*DEPVAR)", found, Print::STATES));
+        abort(&Error::new("state variables (*DEPVAR)", found, Print::STATES));
     }
 }
 
@@ -93,7 +93,7 @@ pub unsafe extern "C" fn umat_(
     let (normal, all) = unsafe { (*ndi, *ntens) };
     if (normal, all) != (3, 6) {
         let allowed = "3 and 3: solids; no plane stress, no plane strain";
-        end(&Error::new("normal and shear stresses", format!("{normal} and {}", all - normal), allowed));
+        abort(&Error::new("normal and shear stresses", format!("{normal} and {}", all - normal), allowed));
     }
     // SAFETY: the caller's promise; `NTENS` is 6, lengths below 0 are 0
     let (name, constants, state, change) = unsafe {
@@ -104,7 +104,7 @@ pub unsafe extern "C" fn umat_(
             [stran, dstran].map(|six| Voigt::from_column_slice(std::slice::from_raw_parts(six, 6))),
         )
     };
-    let answer: Result<_, Error> = with(name, constants, |material| match material {
+    let answer: Result<_, Error> = with_material(name, constants, |material| match material {
         // SAFETY: the caller's promise
         Material::Rubber(rubber) => {
             let (stress, tangent, energy) = rubber.stored(unsafe { &*dfgrd1 })?;
@@ -201,7 +201,7 @@ pub unsafe extern "C" fn umat_user_(
     // SAFETY: the caller's promise
     let (orientation, kode) = unsafe { (*iorien, *kode) };
     if orientation != 0 {
-        end(&Error::new("*ORIENTATION", orientation, "none: these materials are isotropic"));
+        abort(&Error::new("*ORIENTATION", orientation, "none: these materials are isotropic"));
     }
     // SAFETY: the caller's promise: xstate(nstate, mi(1), elements), numbers from 1
     let (name, constants, strain, old, new) = unsafe {
@@ -218,7 +218,7 @@ pub unsafe extern "C" fn umat_user_(
     };
     // shears doubled
     let doubled = Voigt::from_fn(|k, _| strain[k] * if k < 3 { 1.0 } else { 2.0 });
-    let answer = with(name, constants, |material| match material {
+    let answer = with_material(name, constants, |material| match material {
         Material::Rubber(rubber) => {
             let c = Voigt::from_fn(|k, _| 2.0 * strain[k] + if k < 3 { 1.0 } else { 0.0 });
             rubber.material(&c)

@@ -152,7 +152,7 @@ thread_local! {
 ///
 /// # Errors
 /// A constant out of range.
-pub fn with<R>(list: &[f64], work: impl FnOnce(&HostMaterial) -> R) -> Result<R, Error> {
+pub fn with_material<R>(list: &[f64], work: impl FnOnce(&HostMaterial) -> R) -> Result<R, Error> {
     LAST.with_borrow_mut(|last| {
         let (_, constants) = match last.take() {
             Some(kept) if kept.0 == list => last.insert(kept),

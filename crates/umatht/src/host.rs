@@ -57,7 +57,7 @@ pub unsafe extern "C" fn umatht_(
     // SAFETY: the caller's promise
     let (temperature, change, time) = unsafe { (*temp, *dtemp, *dtime) };
     if states.len() < 3 {
-        end(&format!("umatht: NSTATV: found {}; allowed: 3 or more (*DEPVAR)", states.len()));
+        abort(&format!("umatht: NSTATV: found {}; allowed: 3 or more (*DEPVAR)", states.len()));
     }
     let directions = gradient.len();
     let mut at = ThermalIncrement { temperature, change, time, gradient: [0.0; 3] };
@@ -67,12 +67,12 @@ pub unsafe extern "C" fn umatht_(
     let constants = if file::is_asked(constants) {
         // SAFETY: the caller's promise: 80 characters
         let name = String::from_utf8_lossy(unsafe { std::slice::from_raw_parts(cmname.cast::<u8>(), NAME) });
-        whole = file::complete(Path::new(""), &name, constants).unwrap_or_else(|error| end(&error));
+        whole = file::complete(Path::new(""), &name, constants).unwrap_or_else(|error| abort(&error));
         &whole
     } else {
         constants
     };
-    let answer = respond(constants, &at, &state).unwrap_or_else(|error| end(&error.to_string()));
+    let answer = respond(constants, &at, &state).unwrap_or_else(|error| abort(&error.to_string()));
     states[..3].copy_from_slice(&[answer.state.z, answer.state.degree, answer.state.temperature]);
     if let Some(heat) = states.get_mut(3) {
         // the source that CalculiX' DFLUX adds (include/dflux.f)
@@ -100,7 +100,7 @@ pub unsafe extern "C" fn umatht_(
 }
 
 /// Ends the process: a host cannot continue, and no Fortran routine returns an error.
-fn end(message: &str) -> ! {
+fn abort(message: &str) -> ! {
     eprintln!("{message}");
     std::process::exit(2)
 }

@@ -75,7 +75,7 @@ pub struct ThermalResponse {
 /// # Errors
 /// [`Error`]: a constant out of range, a temperature that is not finite or below 0 K.
 pub fn respond(constants: &[f64], at: &ThermalIncrement, state: &State) -> Result<ThermalResponse, Error> {
-    constants::with(constants, |constants| answer(constants, at, state))?
+    constants::with_material(constants, |constants| answer(constants, at, state))?
 }
 
 fn answer(constants: &HostMaterial, at: &ThermalIncrement, state: &State) -> Result<ThermalResponse, Error> {

@@ -3,7 +3,7 @@
 //! Temperatures at which α reaches 0.01, 0.5, 0.99 on cooling are those of `shared/formulation.md`, which an
 //! independent program computed.
 
-use evidence::hosts::{self, run, there};
+use evidence::hosts::{self, has_program, run};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
@@ -31,7 +31,7 @@ fn link(compiler: &str, files: &[&Path], folder: &Path) -> PathBuf {
 /// Calls by names from C give the same bits as from Rust.
 #[test]
 fn answers_in_c() {
-    if !there("gcc") {
+    if !has_program("gcc") {
         return;
     }
     let directory = tempfile::tempdir().unwrap();
@@ -77,7 +77,7 @@ int main(void) {
 /// that are cut back and tried again; prescribed cooling, and a lumped body with latent heat.
 #[test]
 fn follows_the_order_of_abaqus() {
-    if !there("gfortran") {
+    if !has_program("gfortran") {
         return;
     }
     let directory = tempfile::tempdir().unwrap();

@@ -39,7 +39,7 @@ pub fn run(workspace: &Repository, folder: &Path, arguments: &[String]) -> Resul
             let allowed = known().collect::<Vec<_>>().join(", ");
             edge.trim()
                 .parse()
-                .map_err(|_| miette!("`{edge}` is not a number of elements, and none of {allowed}"))
+                .map_err(|_| miette!("found `{edge}`; allowed: a number of elements, or {allowed}"))
         })
         .collect::<Result<_>>()?;
     let wanted = |name: &str| names.is_empty() || names.contains(&name);

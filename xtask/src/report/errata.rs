@@ -50,7 +50,7 @@ impl Erratum {
         Ok(parse(&text.into_diagnostic().wrap_err("docs/errata.md")?))
     }
 
-    fn is(&self, proof: &Proof) -> bool {
+    fn matches(&self, proof: &Proof) -> bool {
         format!("{} {}", self.cells[0], self.cells[1]).contains(&proof.says)
     }
 }
@@ -95,14 +95,14 @@ fn cells(line: &str) -> Vec<String> {
 pub fn faults(workspace: &Repository, rows: &[Erratum], proofs: &[Proof]) -> Vec<String> {
     let mut faults = Vec::new();
     for row in rows {
-        let count = proofs.iter().filter(|proof| row.is(proof)).count();
+        let count = proofs.iter().filter(|proof| row.matches(proof)).count();
         if count != 1 {
             faults.push(format!("docs/errata.md, {} {}: {count} proofs", row.chapter, row.cells[0]));
         }
     }
     for proof in proofs {
         let mut fault = |text: String| faults.push(format!("erratum `{}`: {text}", proof.says));
-        if rows.iter().filter(|row| row.is(proof)).count() != 1 {
+        if rows.iter().filter(|row| row.matches(proof)).count() != 1 {
             fault("is not exactly one row of docs/errata.md".to_owned());
         }
         if proof.numbers.is_empty() && proof.tests.is_empty() {
@@ -116,7 +116,7 @@ pub fn faults(workspace: &Repository, rows: &[Erratum], proofs: &[Proof]) -> Vec
 /// Evaluates the numbers of the rows.
 pub fn judge(rows: &[Erratum], proofs: &[Proof], found: &MeasuredNumbers) -> Vec<ErratumVerdict> {
     let judged = |row: &Erratum| {
-        let proof = proofs.iter().find(|proof| row.is(proof));
+        let proof = proofs.iter().find(|proof| row.matches(proof));
         let findings = proof.map_or_else(Vec::new, |proof| {
             found.findings(proof.case.as_deref(), &proof.numbers, &proof.tests)
         });

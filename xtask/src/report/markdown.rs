@@ -22,7 +22,7 @@ pub fn text(page: &Page, outcomes: &[CaseOutcome]) -> String {
         text += &format!("\n**{} failed**:\n\n```text\n{complaint}\n```\n", outcome.case);
     }
     text += "\n## Kinds of evidence\n\n";
-    let mut table = TextTable::new(["kind", "expectations", "what it is"]);
+    let mut table = TextTable::new(["kind", "expectations", "meaning"]);
     for (kind, count) in summary::kinds(outcomes) {
         table.push([kind.to_string(), count.to_string(), meaning(kind).to_owned()]);
     }

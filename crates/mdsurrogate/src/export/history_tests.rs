@@ -1,6 +1,6 @@
 //! Exported laws with a history: routines of Abaqus and CalculiX along a path, and in CalculiX itself.
 
-use super::tests::{numbers_of, run, there};
+use super::tests::{has_program, numbers_of, run};
 use super::*;
 use crate::network::Activation::Softplus;
 use crate::surrogate::{Kind, Softening, SofteningHistory, Workspace};
@@ -38,7 +38,7 @@ fn routines_follow_the_history() {
         c_source(&law(), "law").unwrap_err().to_string().contains("--form fortran")
             && onnx(&law(), OnnxOptions::default()).is_err()
     );
-    if !there("gfortran") {
+    if !has_program("gfortran") {
         return;
     }
     let directory = tempfile::tempdir().unwrap();

@@ -7,7 +7,7 @@ use crate::network::{
     Architecture,
 };
 use crate::surrogate::{Flags, Header, Kind, Prediction, Support, Workspace, examples};
-pub(super) use evidence::hosts::{run, there};
+pub(super) use evidence::hosts::{has_program, run};
 use polycore::constitutive::Law;
 use polycore::tensor::{DeformationGradient, Tensor, Voigt, Voigt6x6, voigt};
 use std::path::Path;
@@ -73,7 +73,7 @@ fn write(path: &Path, text: &str) {
 
 #[test]
 fn exported_c_agrees() {
-    if !there("gcc") {
+    if !has_program("gcc") {
         return;
     }
     let directory = tempfile::tempdir().unwrap();
@@ -128,7 +128,7 @@ fn exported_c_agrees() {
 /// The subroutine against the law, the UMAT against the push-forward in Rust, each law a program of its own.
 #[test]
 fn exported_fortran_agrees() {
-    if !there("gfortran") {
+    if !has_program("gfortran") {
         return;
     }
     let directory = tempfile::tempdir().unwrap();

@@ -38,7 +38,7 @@ fn spills(function: &[(u64, &str)]) -> Vec<usize> {
 /// evaluated, the least and the largest stretch.
 #[test]
 fn inner_loops_do_not_spill() {
-    if !evidence::hosts::there("objdump") {
+    if !evidence::hosts::has_program("objdump") {
         return;
     }
     let program = std::env::current_exe().unwrap();

@@ -50,10 +50,10 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
         }
         phases.start("output");
         for fit in &set.fits {
-            record(&mut report, name, table, fit)?;
+            record_fit(&mut report, name, table, fit)?;
             for other in case.data.iter().filter(|other| case.cross && other.name != *name) {
                 let key = format!("{name}.{}.{}", fit.model.key, other.name);
-                let found = judge_on(&mut report, &key, &fit.law, &other.table)?;
+                let found = record_cross(&mut report, &key, &fit.law, &other.table)?;
                 set.crossed.push((fit.model.key, &other.name, found));
             }
         }
@@ -106,7 +106,7 @@ fn scaled(value: f64, unit: &str) -> (f64, &'static str) {
 
 /// Records rms, mean absolute error and R² of a law on another table than that of its fit; if it locks there,
 /// how often.
-fn judge_on(
+fn record_cross(
     report: &mut Report,
     key: &str,
     law: &dyn Hyperelastic,
@@ -122,11 +122,11 @@ fn judge_on(
         return Ok(None);
     }
     let found = Agreement::new(law, table)?;
-    agree(report, key, &found);
+    record_agreement(report, key, &found);
     Ok(Some(found))
 }
 
-fn agree(report: &mut Report, key: &str, found: &Agreement) {
+fn record_agreement(report: &mut Report, key: &str, found: &Agreement) {
     report.value(q::RMS.of(&[key]), found.rms / MPA);
     report.value(q::MAE.of(&[key]), found.mae / MPA);
     if let Some(r2) = found.r2 {
@@ -134,7 +134,7 @@ fn agree(report: &mut Report, key: &str, found: &Agreement) {
     }
 }
 
-fn record(report: &mut Report, data: &str, table: &TestData, fit: &Fit) -> Result<(), Error> {
+fn record_fit(report: &mut Report, data: &str, table: &TestData, fit: &Fit) -> Result<(), Error> {
     let key = format!("{data}.{}", fit.model.key);
     report.value(q::SHEAR_MODULUS.of(&[&key]), fit.law.shear_modulus() / MPA);
     for parameter in &fit.parameters {
@@ -145,8 +145,8 @@ fn record(report: &mut Report, data: &str, table: &TestData, fit: &Fit) -> Resul
             report.value(quantity, scaled(error, parameter.unit).0);
         }
     }
-    agree(report, &key, &Agreement::new(&fit.law, table)?);
-    report.value(q::STABLE.of(&[&key]), f64::from(u8::from(unstable(fit, table).is_none())));
+    record_agreement(report, &key, &Agreement::new(&fit.law, table)?);
+    report.value(q::STABLE.of(&[&key]), f64::from(u8::from(find_instability(fit, table).is_none())));
     report.work(&format!("{key}.evaluations"), fit.iterations as u64);
     report.work(&format!("{key}.starts"), fit.starts.0 as u64);
     report.work(&format!("{key}.starts_that_agree"), fit.starts.1 as u64);
@@ -154,7 +154,7 @@ fn record(report: &mut Report, data: &str, table: &TestData, fit: &Fit) -> Resul
 }
 
 /// Finds the test and the stretch at which a law first becomes unstable, within the stretches of a table.
-fn unstable(fit: &Fit, table: &TestData) -> Option<(Mode, f64)> {
+fn find_instability(fit: &Fit, table: &TestData) -> Option<(Mode, f64)> {
     let ends = stability::range(table);
     let all = Mode::TESTS.into_iter().flat_map(|mode| ends.map(|end| (mode, end)));
     all.filter(|(_, end)| *end != 1.0)
@@ -272,13 +272,9 @@ fn summary(case: &FitCase, all: &[TableFits], report: &Report) -> String {
     }
     for set in all {
         text += &verdicts(set);
-        let _ = writeln!(
-            text,
-            "parameters on {} (± standard error, - where the data do not determine it)",
-            set.name
-        );
+        let _ = writeln!(text, "parameters on {} (± standard error, if the data determine it)", set.name);
         for fit in &set.fits {
-            let list: Vec<String> = fit.parameters.iter().map(shown).collect();
+            let list: Vec<String> = fit.parameters.iter().map(format_parameter).collect();
             let _ = writeln!(text, "  {:<22}{}", fit.model.key, list.join(", "));
         }
         text += &material::best(set.name, &set.fits);
@@ -305,8 +301,7 @@ fn verdicts(set: &TableFits) -> String {
     let [low, high] = stability::range(set.table);
     let mut text = format!(
         "R² of laws fitted to {}; stability (Drucker) in uniaxial, equibiaxial and pure shear tests at \
-         stretches {low:.3} to \
-         {high:.3}\n",
+         stretches {low:.3} to {high:.3}\n",
         set.name
     );
     for fit in &set.fits {
@@ -330,7 +325,7 @@ fn verdicts(set: &TableFits) -> String {
             let verdict = if unsafe_there { "unsafe outside" } else { "safe outside" };
             let _ = write!(text, "; {verdict} {}", set.name);
         }
-        match unstable(fit, set.table) {
+        match find_instability(fit, set.table) {
             Some((mode, stretch)) => {
                 let _ =
                     writeln!(text, "; unstable in {} tests from the stretch {stretch:.3} on", mode.name());
@@ -341,8 +336,8 @@ fn verdicts(set: &TableFits) -> String {
     text
 }
 
-/// Formats a parameter: `links 25.46 ± 0.13`.
-fn shown(parameter: &FittedParameter) -> String {
+/// Formats a parameter: `links 25.46 ± 0.13`; without a standard error only its value.
+fn format_parameter(parameter: &FittedParameter) -> String {
     let name = parameter.name;
     let (unit, scale) = if parameter.unit == "Pa" { unit_of(parameter.value) } else { ("", 1.0) };
     let number = |value: f64| digits(value / scale, 6);
@@ -350,9 +345,9 @@ fn shown(parameter: &FittedParameter) -> String {
         Identifiability::Absent => format!("{name} absent"),
         Identifiability::Undetermined => format!("{name} not determined"),
         Identifiability::Determined => {
-            let error = parameter.standard_error.map(|error| digits(error / scale, 2));
-            let error = error.unwrap_or_else(|| "-".to_owned());
-            format!("{name} {} ± {error} {unit}", number(parameter.value)).trim_end().to_owned()
+            let error = parameter.standard_error.map(|error| format!(" ± {}", digits(error / scale, 2)));
+            let error = error.unwrap_or_default();
+            format!("{name} {}{error} {unit}", number(parameter.value)).trim_end().to_owned()
         }
     }
 }

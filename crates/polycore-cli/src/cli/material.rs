@@ -51,7 +51,7 @@ fn block(fit: &Fit) -> String {
                 writeln!(text, " # ± {:.2e} {unit}, 95 %", error / scale)
             }
             Some(error) => writeln!(text, " # ± {error:.2e}, 95 %"),
-            None => writeln!(text, " # its error is not determined by the data"),
+            None => writeln!(text, " # the data do not determine its error"),
         };
     }
     text
@@ -59,19 +59,19 @@ fn block(fit: &Fit) -> String {
 
 /// Returns the reason for which a fitted law is no usable material, with advice.
 pub fn unusable(fit: &Fit) -> Option<String> {
-    let names = |standing| -> Vec<&str> {
-        let those = fit.parameters.iter().filter(|parameter| parameter.identifiability == identifiability);
+    let names = |verdict: Identifiability| -> Vec<&str> {
+        let those = fit.parameters.iter().filter(|parameter| parameter.identifiability == verdict);
         those.map(|parameter| parameter.name).collect()
     };
     let (absent, open) = (names(Identifiability::Absent), names(Identifiability::Undetermined));
     if !absent.is_empty() {
-        return Some(format!("without {} it is a law of fewer parameters: take that", absent.join(", ")));
+        return Some(format!(
+            "without {} it is a law with fewer parameters: use that law",
+            absent.join(", ")
+        ));
     }
     (!open.is_empty()).then(|| {
-        format!(
-            "the data do not determine {}, its values are as good as infinite: take `neo-hookean`",
-            open.join(", ")
-        )
+        format!("the data do not determine {}, which may be infinite: use `neo-hookean`", open.join(", "))
     })
 }
 
@@ -96,7 +96,7 @@ pub fn best(data: &str, fits: &[Fit]) -> String {
 /// Writes `materials.toml`: the block of every fit, under comments.
 pub fn write(directory: &Path, all: &[TableFits]) -> Result<(), Error> {
     atomic_write(directory.join("materials.toml"), |file| {
-        writeln!(file, "# Take one block: docs/guide/src/how-to/fit.md says what it can and cannot do.")?;
+        writeln!(file, "# Use one block; docs/guide/src/how-to/fit.md describes its limits.")?;
         for set in all {
             for fit in &set.fits {
                 write!(file, "\n# fitted to {}\n{}", set.name, block(fit))?;

@@ -109,7 +109,7 @@ impl FitCase {
         let Scene { _program: Program::Polycore, title, fit, trial, expect } = source.parse()?;
         let laws = match &fit.laws {
             None => MODELS.iter().collect(),
-            Some(names) => selected(source, names)?,
+            Some(names) => select_laws(source, names)?,
         };
         let mut data: Vec<DataSet> = Vec::new();
         for (i, entry) in fit.data.into_iter().enumerate() {
@@ -126,7 +126,7 @@ impl FitCase {
                     "another name",
                 ));
             }
-            let meaning = TestFormat {
+            let format = TestFormat {
                 mode: entry.mode,
                 strain: entry.strain,
                 stress: entry.stress,
@@ -134,13 +134,13 @@ impl FitCase {
                 strain_column: entry.strain_column,
                 stress_column: entry.stress_column,
             };
-            let reading = TestData::read_as(source.file(&entry.file), &meaning)
+            let reading = TestData::read_as(source.file(&entry.file), &format)
                 .map_err(|error| source.refused(&key("file"), error))?;
             let read = [vec![reading.description], reading.notes].concat();
             let mut table = reading.table;
             if let Some(mode) = entry.mode {
                 table = table.select(mode).map_err(|error| {
-                    source.error(&key("mode"), error, "a test of which the table has a stress")
+                    source.error(&key("mode"), error, "a test with a stress in the table")
                 })?;
             }
             neo_hookean_modulus(&table).map_err(|error| source.refused(&key("file"), error))?;
@@ -184,8 +184,8 @@ impl FitCase {
         let _ = writeln!(
             text,
             "{} fits, {} trials, {} expectations; writes fits.csv, <data>_states.csv, materials.toml, \
-             pictures (not with \
-             --quick), report.json",
+             pictures \
+             (not with --quick), report.json",
             self.laws.len() * self.data.len(),
             self.trials.len(),
             self.expect.len()
@@ -228,7 +228,7 @@ impl FitCase {
     }
 }
 
-fn selected(source: &Source, names: &[String]) -> Result<Vec<&'static ModelDescriptor>, SceneError> {
+fn select_laws(source: &Source, names: &[String]) -> Result<Vec<&'static ModelDescriptor>, SceneError> {
     let mut laws: Vec<&'static ModelDescriptor> = Vec::new();
     for (i, name) in names.iter().enumerate() {
         let all = || MODELS.iter().map(|model| model.key).collect::<Vec<_>>().join(", ");
@@ -243,7 +243,7 @@ fn selected(source: &Source, names: &[String]) -> Result<Vec<&'static ModelDescr
         laws.push(model);
     }
     if laws.is_empty() {
-        return Err(source.error("fit.laws", "no law", "at least one, or no key `laws` for all"));
+        return Err(source.error("fit.laws", "no law", "at least one law; leave out `laws` to fit all"));
     }
     Ok(laws)
 }
@@ -252,23 +252,23 @@ fn selected(source: &Source, names: &[String]) -> Result<Vec<&'static ModelDescr
 fn advice(name: &str) -> Option<&'static str> {
     let plain: String = name.to_lowercase().chars().filter(char::is_ascii_alphanumeric).collect();
     Some(match plain.as_str() {
-        "arrudaboyce" | "8chain" => "`eight-chain`: that is Arruda and Boyce's law",
-        "ogden" => "`ogden-1`, `ogden-2` or `ogden-3`: by the number of terms",
-        "mooney" | "polynomial" | "polynomial1" => "`mooney-rivlin`: the polynomial of first order",
+        "arrudaboyce" | "8chain" => "`eight-chain`, the law of Arruda and Boyce",
+        "ogden" => "`ogden-1`, `ogden-2` or `ogden-3`, by the number of terms",
+        "mooney" | "polynomial" | "polynomial1" => "`mooney-rivlin`, the polynomial of first order",
         "reducedpolynomial" | "reducedpolynomial3" | "polynomial3" | "yeoh3" => {
-            "`yeoh`: the reduced polynomial of third order"
+            "`yeoh`, the reduced polynomial of third order"
         }
-        "biderman" => "`yeoh`: of I1 alone",
+        "biderman" => "`yeoh`, a polynomial in I1 alone",
         "neohooke" | "neohookean" | "neo" => "`neo-hookean`",
-        "marlow" | "vanderwaals" | "extendedtube" => "`eight-chain-root-i2`, the nearest by its behaviour",
+        "marlow" | "vanderwaals" | "extendedtube" => "`eight-chain-root-i2`, which behaves most similarly",
         "prony" | "viscoelastic" | "maxwell" | "creep" => {
-            "an elastic law: rates and relaxation are not modelled; fit the curve of the slowest test"
+            "an elastic law; rates and relaxation are not modelled, so fit the curve of the slowest test"
         }
         "poissonratio" | "nu" => {
-            "nothing: the rubber of a fit is incompressible; compressibility is `bulk_modulus` in a scene \
-             of peri"
+            "no such parameter: the rubber of a fit is incompressible; compressibility is `bulk_modulus` in \
+             a scene of peri"
         }
-        "hyperfoam" | "ogdenfoam" | "blatzko" => "an incompressible law: foams are not among them",
+        "hyperfoam" | "ogdenfoam" | "blatzko" => "an incompressible law; foams are not modelled",
         _ => return None,
     })
 }

@@ -79,7 +79,7 @@ impl FitTrial {
         fixed.chain(own).map(|quantity| quantity.name).collect()
     }
 
-    fn attempt(&self) -> Result<TrialResult, constitutive::Error> {
+    fn evaluate(&self) -> Result<TrialResult, constitutive::Error> {
         let model = model(&self.law)?;
         if let Some(data) = &self.data {
             let state = |(stretch, nominal): &(f64, Stress)| TestState {
@@ -131,20 +131,29 @@ pub fn check(source: &Source, trials: &[FitTrial]) -> Result<(), SceneError> {
             let all: Vec<&str> = hyperelastic::MODELS.iter().map(|model| model.key).collect();
             return Err(source.error(&key("law"), format!("`{}`", trial.law), all.join(", ")));
         };
-        if trial.data.is_some() == trial.parameters.is_some() {
-            let found = if trial.data.is_some() { "`data` together with `parameters`" } else { "neither" };
-            return Err(source.error(&key("law"), found, "`parameters` and `stretch`, or `data` to fit"));
+        match (&trial.data, &trial.parameters) {
+            (Some(_), Some(_)) => {
+                let why = "a law is either evaluated with `parameters` or fitted to `data`";
+                return Err(source.conflict(&key("data"), "parameters", why));
+            }
+            (None, None) => {
+                let why = "needed with `stretch` to evaluate the law, or `data` to fit it";
+                return Err(source.missing(&key("parameters"), why));
+            }
+            _ => {}
         }
-        if trial.data.is_some() && (trial.stretch.is_some() || trial.bulk.is_some()) {
-            let found = "`stretch` or `bulk` together with `data`";
-            return Err(source.error(&key("data"), found, "`data` alone: the law is fitted"));
+        for (name, is_given) in [("stretch", trial.stretch.is_some()), ("bulk", trial.bulk.is_some())] {
+            if trial.data.is_some() && is_given {
+                let why = "the law is fitted to `data`; remove it, or give `parameters` instead of `data`";
+                return Err(source.unexpected(&key(name), why));
+            }
         }
         let Some(parameters) = &trial.parameters else { continue };
         if parameters.len() != model.parameters.len() {
             let names: Vec<_> = model.parameters.iter().map(|parameter| parameter.name).collect();
             return Err(source.error(
                 &key("parameters"),
-                format!("{} of them", parameters.len()),
+                format!("{} parameters", parameters.len()),
                 names.join(", "),
             ));
         }
@@ -152,13 +161,14 @@ pub fn check(source: &Source, trials: &[FitTrial]) -> Result<(), SceneError> {
             if matches!(given, ParameterValue::Stress(_)) != (parameter.unit == "Pa") {
                 let (found, allowed) = match parameter.unit {
                     "Pa" => (format!("`{}` without a unit", parameter.name), "a stress, as \"0.3 MPa\""),
-                    _ => (format!("`{}` with a unit", parameter.name), "a number without unit"),
+                    _ => (format!("`{}` with a unit", parameter.name), "a number without a unit"),
                 };
                 return Err(source.error(&key("parameters"), found, allowed));
             }
         }
         if trial.stretch.is_none() {
-            return Err(source.error(&key("parameters"), "no `stretch` beside it", "`stretch = 2.0`"));
+            let why = "needed with `parameters` to evaluate the law, e.g. `stretch = 2.0`";
+            return Err(source.missing(&key("stretch"), why));
         }
     }
     Ok(())
@@ -170,9 +180,9 @@ pub fn check(source: &Source, trials: &[FitTrial]) -> Result<(), SceneError> {
 /// Unexpected failures.
 pub fn run(trial: &FitTrial, report: &mut Report) -> Result<(), Error> {
     let of = |quantity: Quantity| quantity.of(&[&trial.name]);
-    let seen = trial.attempt();
+    let result = trial.evaluate();
     let mut passed = true;
-    let text = match (seen, &trial.refused) {
+    let text = match (result, &trial.refused) {
         (Err(error), Some(part)) => {
             let error = error.to_string();
             passed = error.contains(part.as_str());
@@ -180,12 +190,12 @@ pub fn run(trial: &FitTrial, report: &mut Report) -> Result<(), Error> {
             format!("refused: {error}")
         }
         (Err(error), None) => return Err(error.into()),
-        (Ok(seen), refused) => {
+        (Ok(result), refused) => {
             if refused.is_some() {
                 passed = false;
                 report.value(of(q::REFUSED), 0.0);
             }
-            match seen {
+            match result {
                 TrialResult::Stress { nominal, energy } => {
                     report.value(of(q::NOMINAL), nominal / MPA);
                     report.value(of(q::ENERGY), energy / MPA);
@@ -211,11 +221,11 @@ pub fn run(trial: &FitTrial, report: &mut Report) -> Result<(), Error> {
 
 /// Marks a trial as failed if any expectation on it fails.
 pub fn judge(trials: &[FitTrial], report: &mut Report) {
-    for (trial, seen) in trials.iter().zip(&mut report.trials) {
+    for (trial, result) in trials.iter().zip(&mut report.trials) {
         let own = trial.quantities();
         let fails = |judged: &&Judgement| {
             !judged.pass && judged.expect.names().any(|name| own.iter().any(|o| o == name))
         };
-        seen.passed &= !report.expect.iter().any(|judged| fails(&judged));
+        result.passed &= !report.expect.iter().any(|judged| fails(&judged));
     }
 }

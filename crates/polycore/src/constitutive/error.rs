@@ -46,7 +46,7 @@ pub enum Error {
         law: String,
     },
     /// Unknown name of a law.
-    #[error("there is no hyperelastic law `{name}`")]
+    #[error("unknown hyperelastic law `{name}`")]
     UnknownLaw {
         /// The name requested.
         name: String,

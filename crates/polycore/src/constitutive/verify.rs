@@ -53,7 +53,7 @@ impl Deviations {
         let mut list = vec![Prediction::default(); points.len()];
         law.stresses(&points, &mut memory, &mut list)?;
         for ((f, c), listed) in deformations.iter().zip(&points).zip(&list) {
-            let size = all.at(law, c, listed, &mut memory)?;
+            let size = all.measure_at(law, c, listed, &mut memory)?;
             let turned = DeformationGradient::new(rotation * f.matrix())?;
             let (own, _) = law.cauchy_stress(f, &mut memory)?;
             let (other, _) = law.cauchy_stress(&turned, &mut memory)?;
@@ -64,7 +64,7 @@ impl Deviations {
     }
 
     /// Measures the law at one C; returns its size there.
-    fn at(
+    fn measure_at(
         &mut self,
         law: &dyn Law,
         c: &Voigt,

@@ -145,18 +145,18 @@ impl Inverse {
     /// 𝓛⁻¹ of a row, branching on the choice once; as many numbers as the shorter slice has.
     pub fn fill(self, x: &[f64], beta: &mut [f64]) {
         match self {
-            Self::Exact => each(x, beta, inverse),
-            Self::Cohen => each(x, beta, |x| signed(x, cohen)),
-            Self::Treloar => each(x, beta, |x| signed(x, treloar)),
-            Self::Puso => each(x, beta, |x| signed(x, puso)),
-            Self::Bergstrom => each(x, beta, |x| signed(x, bergstrom)),
-            Self::Nguessong => each(x, beta, |x| signed(x, nguessong)),
-            Self::Darabi => each(x, beta, |x| signed(x, darabi)),
-            Self::Jedynak2015 => each(x, beta, |x| signed(x, jedynak_2015)),
-            Self::Kroger => each(x, beta, |x| signed(x, kroger)),
-            Self::Petrosyan => each(x, beta, |x| signed(x, petrosyan)),
-            Self::Jedynak2017 => each(x, beta, |x| signed(x, jedynak_2017)),
-            Self::Jedynak2019 => each(x, beta, |x| signed(x, jedynak_2019)),
+            Self::Exact => fill(x, beta, inverse),
+            Self::Cohen => fill(x, beta, |x| signed(x, cohen)),
+            Self::Treloar => fill(x, beta, |x| signed(x, treloar)),
+            Self::Puso => fill(x, beta, |x| signed(x, puso)),
+            Self::Bergstrom => fill(x, beta, |x| signed(x, bergstrom)),
+            Self::Nguessong => fill(x, beta, |x| signed(x, nguessong)),
+            Self::Darabi => fill(x, beta, |x| signed(x, darabi)),
+            Self::Jedynak2015 => fill(x, beta, |x| signed(x, jedynak_2015)),
+            Self::Kroger => fill(x, beta, |x| signed(x, kroger)),
+            Self::Petrosyan => fill(x, beta, |x| signed(x, petrosyan)),
+            Self::Jedynak2017 => fill(x, beta, |x| signed(x, jedynak_2017)),
+            Self::Jedynak2019 => fill(x, beta, |x| signed(x, jedynak_2019)),
         }
     }
 
@@ -184,7 +184,7 @@ impl Inverse {
 }
 
 #[inline(always)]
-fn each(x: &[f64], beta: &mut [f64], formula: impl Fn(f64) -> f64) {
+fn fill(x: &[f64], beta: &mut [f64], formula: impl Fn(f64) -> f64) {
     for (beta, &x) in beta.iter_mut().zip(x) {
         *beta = formula(x);
     }

@@ -27,12 +27,12 @@ pub fn conjugate_gradients<const D: usize>(
         }
         precondition(residual, &mut conditioned);
         let square = dot(residual, &conditioned);
-        each(&mut direction, &conditioned, |direction, own| *own + *direction * (square / before));
+        for_each_chunk(&mut direction, &conditioned, |direction, own| *own + *direction * (square / before));
         before = square;
         product(&direction, &mut image);
         let length = square / dot(&direction, &image);
-        each(&mut solution, &direction, |solution, direction| *solution + direction * length);
-        each(residual, &image, |residual, image| *residual - image * length);
+        for_each_chunk(&mut solution, &direction, |solution, direction| *solution + direction * length);
+        for_each_chunk(residual, &image, |residual, image| *residual - image * length);
     }
     (solution, most)
 }

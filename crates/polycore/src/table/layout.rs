@@ -245,7 +245,7 @@ impl Layout {
                     (None, Some(row)) => {
                         return Err((sample[row].0 + 1, rows[row].iter().collect::<Vec<_>>().join(", ")));
                     }
-                    (None, None) => return Err((0, "nothing".to_owned())),
+                    (None, None) => return Err((0, "an empty file".to_owned())),
                 }
             }
         };

@@ -150,7 +150,7 @@ fn refusals_say_how_the_table_was_understood() {
         ("strain,stress\n0.1,1\n", ["t.csv:1: unit of column 2, `stress`", "has no unit"]),
         ("strain,stress [kg]\n0.1,1\n", ["unit of column 2", "a stress is needed"]),
         ("0.1,1\n0.2,2\n", ["t.csv:1: headings: found \"0.1, 1\"", "a line of headings"]),
-        ("", ["headings: found \"nothing\"", "a line of headings"]),
+        ("", ["headings: found \"an empty file\"", "a line of headings"]),
         (
             "strain,strain,stress [MPa]\n1,1,1\n",
             ["found \"strain,strain,stress [MPa]\"", "one column `strain"],

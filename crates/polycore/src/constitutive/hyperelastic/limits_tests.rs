@@ -121,7 +121,7 @@ fn bad_parameters_are_refused_with_the_value() {
         ("eight-chain", vec![f64::NAN, 9.0], "eight-chain: chain_modulus = NaN is outside (0, ∞)"),
         ("eight-chain-root-i2", vec![1.0, 9.0, -1.0], "eight-chain + c√I2: c = -1 is outside [0, ∞)"),
         ("gent", vec![1.0], "law `gent`: 1 parameters given, 2 needed"),
-        ("rubber", vec![1.0], "there is no hyperelastic law `rubber`"),
+        ("rubber", vec![1.0], "unknown hyperelastic law `rubber`"),
     ] {
         let error = model(key).and_then(|model| model.law(&p)).err().unwrap().to_string();
         assert!(error.starts_with(message), "{error}");

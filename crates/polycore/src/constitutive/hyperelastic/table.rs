@@ -62,10 +62,10 @@ impl TestData {
     ///
     /// # Errors
     /// [`crate::Error::Io`]; errors of [`TestData::parse_as`].
-    pub fn read_as(path: impl AsRef<Path>, meaning: &TestFormat) -> Result<ImportedTest, crate::Error> {
+    pub fn read_as(path: impl AsRef<Path>, format: &TestFormat) -> Result<ImportedTest, crate::Error> {
         let path = path.as_ref();
         let bytes = std::fs::read(path).map_err(crate::Error::from_io("read", path))?;
-        Ok(Self::parse_as(&path.display().to_string(), bytes, meaning)?)
+        Ok(Self::parse_as(&path.display().to_string(), bytes, format)?)
     }
 
     /// Parses the bytes of a file as [`TestData::read_as`] does.
@@ -74,10 +74,10 @@ impl TestData {
     /// [`Error::Data`] with line and column: headings, units and modes that are unknown or ambiguous, text
     /// instead of numbers, a stretch that is not positive, strains that look like stretches or vice versa, a
     /// stiffness below zero, no measurement at all.
-    pub fn parse_as(name: &str, bytes: Vec<u8>, meaning: &TestFormat) -> Result<ImportedTest, Error> {
+    pub fn parse_as(name: &str, bytes: Vec<u8>, format: &TestFormat) -> Result<ImportedTest, Error> {
         let file = table::Table::parse(name, bytes).map_err(located)?;
-        let columns = TestColumns::of(&file, meaning).map_err(located)?;
-        columns.read(&file, meaning).map_err(located)
+        let columns = TestColumns::find(&file, format).map_err(located)?;
+        columns.read(&file, format).map_err(located)
     }
 }
 
@@ -111,7 +111,7 @@ const LAYOUTS: &str = "a strain (`stretch`, `strain [%]`) and a stress (`nominal
                        several tests, or `stretch_1`, `stretch_2`, `nominal_1 [MPa]`, `nominal_2 [MPa]`";
 
 impl TestColumns {
-    fn of(file: &table::Table, meaning: &TestFormat) -> Result<Self, table::Error> {
+    fn find(file: &table::Table, format: &TestFormat) -> Result<Self, table::Error> {
         let roles: Vec<Option<Role>> = file.headings.iter().map(Role::from_heading).collect();
         let strain =
             |what: ColumnKind| if let ColumnKind::Strain(measure) = what { Some(measure) } else { None };
@@ -125,7 +125,7 @@ impl TestColumns {
             };
             has(&|what| strain(what).is_some()) && has(&|what| stress(what).is_some())
         };
-        let biaxial = meaning.strain_column.is_none() && paired(0) && paired(1);
+        let biaxial = format.strain_column.is_none() && paired(0) && paired(1);
         // `strain 1, stress 1, strain 2, stress 2` are specimens side by side
         let place = |axis, test: &dyn Fn(ColumnKind) -> bool| {
             roles.iter().position(|role| {
@@ -148,8 +148,8 @@ impl TestColumns {
                 axis,
                 &Wanted {
                     key: "strain",
-                    name: meaning.strain_column.as_deref(),
-                    measure: meaning.strain,
+                    name: format.strain_column.as_deref(),
+                    measure: format.strain,
                     of: &strain,
                     order: &[StrainMeasure::Stretch, StrainMeasure::Engineering, StrainMeasure::True],
                     assumed: StrainMeasure::Engineering,
@@ -161,8 +161,8 @@ impl TestColumns {
                 axis,
                 &Wanted {
                     key: "stress",
-                    name: meaning.stress_column.as_deref(),
-                    measure: meaning.stress,
+                    name: format.stress_column.as_deref(),
+                    measure: format.stress,
                     of: &stress,
                     order: &[TestStressMeasure::Nominal, TestStressMeasure::True],
                     assumed: TestStressMeasure::Nominal,
@@ -189,9 +189,9 @@ impl TestColumns {
         Ok(Self { mode, strains, stresses })
     }
 
-    fn read(&self, file: &table::Table, meaning: &TestFormat) -> Result<ImportedTest, table::Error> {
+    fn read(&self, file: &table::Table, format: &TestFormat) -> Result<ImportedTest, table::Error> {
         let unit = |chosen: &TestColumn<TestStressMeasure>| {
-            let text = chosen.unit.as_deref().or(meaning.stress_unit.as_deref()).unwrap_or_default();
+            let text = chosen.unit.as_deref().or(format.stress_unit.as_deref()).unwrap_or_default();
             Unit::<StressDimension>::parse(&plain_unit(text)).map_err(|error| {
                 let what =
                     format!("unit of column {}, `{}`", chosen.column + 1, file.headings[chosen.column].text);
@@ -226,7 +226,7 @@ impl TestColumns {
         let mut rows = Vec::with_capacity(file.rows());
         let mut blank = 0;
         for index in 0..file.rows() {
-            let (test, compression) = self.test(file, index, meaning)?;
+            let (test, compression) = self.test(file, index, format)?;
             let mut row = TestRow {
                 index,
                 mode: test,
@@ -290,7 +290,7 @@ impl TestColumns {
         }
         if self.strains.len() == 1 {
             let chosen = &self.strains[0];
-            let said = meaning.strain.is_some() || meaning.strain_column.is_some();
+            let said = format.strain.is_some() || format.strain_column.is_some();
             plausible(&mut rows, &mut notes, chosen.measure, said, chosen.unit.is_some())
                 .map_err(|(row, allowed)| file.refuse_cell(row, chosen.column, &allowed))?;
         }
@@ -315,10 +315,10 @@ impl TestColumns {
         &self,
         file: &table::Table,
         row: usize,
-        meaning: &TestFormat,
+        format: &TestFormat,
     ) -> Result<(Mode, bool), table::Error> {
         let Some(column) = self.mode else {
-            let one = meaning.mode.unwrap_or(Mode::Uniaxial);
+            let one = format.mode.unwrap_or(Mode::Uniaxial);
             return Ok((if self.strains.len() == 2 { Mode::Biaxial } else { one }, false));
         };
         mode(file.text(row, column)).ok_or_else(|| {

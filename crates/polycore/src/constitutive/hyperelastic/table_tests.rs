@@ -1,7 +1,7 @@
 use super::*;
 
-fn read(text: &str, meaning: &TestFormat) -> Result<ImportedTest, String> {
-    TestData::parse_as("t.csv", text.as_bytes().to_vec(), meaning).map_err(|error| error.to_string())
+fn read(text: &str, format: &TestFormat) -> Result<ImportedTest, String> {
+    TestData::parse_as("t.csv", text.as_bytes().to_vec(), format).map_err(|error| error.to_string())
 }
 
 fn plain(text: &str) -> ImportedTest {
@@ -97,8 +97,8 @@ fn tests_and_compression() {
         assert_eq!([states[0].stretches[0], states[1].stretches[0]], [0.8, 0.9], "{text}");
         assert_eq!([states[0].nominal[0], states[1].nominal[0]], [-0.4e6, -0.2e6], "{text}");
     }
-    let meaning = TestFormat { mode: Some(Mode::Equibiaxial), ..TestFormat::default() };
-    assert_eq!(read("strain,stress [MPa]\n1,1\n", &meaning).unwrap().table.states[0].stretches, [2.0, 2.0]);
+    let format = TestFormat { mode: Some(Mode::Equibiaxial), ..TestFormat::default() };
+    assert_eq!(read("strain,stress [MPa]\n1,1\n", &format).unwrap().table.states[0].stretches, [2.0, 2.0]);
     // specimens side by side, of different lengths
     let text = "strain 1,stress 1 [MPa],strain 2,stress 2 [MPa]\n1,1,0.5,0.5\n2,2,,\n";
     assert!(read(text, &TestFormat::default()).unwrap_err().contains("if these are specimens side by side"));
@@ -179,7 +179,7 @@ fn bad_tables_are_refused_with_the_line() {
         ("stretch,nominal_MPa\n1,2,3\n", "3 cells"),
         ("mode,stretch,nominal_MPa\nsimple-shear,1,0\n", "found `simple-shear`; allowed: a test: `uniaxial`"),
         ("stretch,nominal_MPa\n1,0\n", "no stress other than zero"),
-        ("", "headings: found `nothing`"),
+        ("", "headings: found `an empty file`"),
         ("strain [mm],stress [MPa]\n1,0.1\n", "unit of column 1"),
         ("strain,true stress [MPa]\n0.1,0.1\n", "`strain = \"engineering\"` or"),
         ("true strain,stress [MPa]\n0.1,0.1\n", "`stress = \"nominal\"` or"),

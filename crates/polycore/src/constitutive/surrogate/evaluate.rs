@@ -1,6 +1,6 @@
 //! Predictions at C: members, their mean, lists of points.
 
-use super::{Kind, Prediction, RestTerm, Surrogate, SurrogateScratch, Workspace, back, product};
+use super::{Kind, Prediction, RestTerm, Surrogate, SurrogateScratch, Workspace, product, to_data_axes};
 use crate::constitutive::Error;
 use crate::constitutive::law::same_length;
 use crate::constitutive::network::{BATCH, LANES, Real, Tape};
@@ -27,7 +27,7 @@ impl Surrogate<f64> {
             for k in 0..invariants.count() {
                 let slope = invariants.gradient(&local, k);
                 features.slopes[k] = match &self.turn {
-                    Some(turn) => back(turn, &slope, &[[0.0; 6]; 6]).0,
+                    Some(turn) => to_data_axes(turn, &slope, &[[0.0; 6]; 6]).0,
                     None => slope,
                 };
             }
@@ -300,7 +300,7 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
             }
         }
         (first, second) = match &self.turn {
-            Some(turn) => back(turn, &first, &second),
+            Some(turn) => to_data_axes(turn, &first, &second),
             None => (first, second),
         };
         Member { energy, first, second }
