@@ -1,7 +1,8 @@
 //! The bond modulus kθ from Young's modulus, and what a lattice makes of it.
 //!
-//! The dual force f = 2t enters the equation of motion (2.6). With t ≈ 3kθ(l − 1), (2.76) and (2.80) equal the standard
-//! constants of the prototype microelastic material; Poisson's ratio is 1/4 (3D, plane strain) or 1/3 (plane stress).
+//! The dual force f = 2t enters the equation of motion (2.6). With t ≈ 3kθ(l − 1), (2.76) and (2.80) equal
+//! the standard constants of the prototype microelastic material; Poisson's ratio is 1/4 (3D, plane strain)
+//! or 1/3 (plane stress).
 
 use crate::bonds::{BodyGeometry, LatticeBonds, Stencil, VolumeCorrection};
 use serde::Deserialize;
@@ -77,7 +78,8 @@ pub fn lattice_factor<const D: usize>(calibration: Calibration, bonds: &LatticeB
     }
 }
 
-/// Small-strain moduli of a regular lattice, each over its exact value (C₁₁₁₁, C₁₁₂₂, E over E) or plain (ν, A).
+/// Small-strain moduli of a regular lattice, each over its exact value (C₁₁₁₁, C₁₁₂₂, E over E) or plain (ν,
+/// A).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LatticeModuli {
     /// C₁₁₁₁ over the isotropic one.
@@ -97,7 +99,8 @@ pub struct LatticeModuli {
 }
 
 impl LatticeModuli {
-    /// Moduli of the lattice with horizon `ratio` spacings: C_ijkl = 3kθ Σ w V ξ_i ξ_j ξ_k ξ_l/|ξ|³, E = Δx = 1.
+    /// Moduli of the lattice with horizon `ratio` spacings: C_ijkl = 3kθ Σ w V ξ_i ξ_j ξ_k ξ_l/|ξ|³, E = Δx
+    /// = 1.
     pub fn new<const D: usize>(ratio: f64, correction: VolumeCorrection) -> Self {
         let space = if D == 2 { Space::PlaneStress } else { Space::Solid };
         let modulus = modulus(space, 1.0, ratio, 1.0);
@@ -142,8 +145,9 @@ impl LatticeModuli {
 mod tests {
     use super::*;
 
-    /// formulation.md, table of lattice moduli at m = 3.015, to its printed digits. Its 3D rows are shifted by one column
-    /// (ΣV/Ω stands under C₁₁₁₁, and so on; `reference/ch2/lattice_moduli.csv` has the columns' names): taken from there.
+    /// formulation.md, table of lattice moduli at m = 3.015, to its printed digits. Its 3D rows are shifted
+    /// by one column (ΣV/Ω stands under C₁₁₁₁, and so on; `reference/ch2/lattice_moduli.csv` has the columns'
+    /// names): taken from there.
     #[test]
     fn lattice_moduli_table() {
         let check = |found: LatticeModuli, expected: [f64; 6], name: &str| {
@@ -197,8 +201,8 @@ mod tests {
         }
     }
 
-    /// The traces of the printed double integrals (A.18), (A.38): 128π/45 on the unit disk and 64π²/35 in the unit ball,
-    /// against the distribution of distances between two points, p(r) of a disk and of a ball.
+    /// The traces of the printed double integrals (A.18), (A.38): 128π/45 on the unit disk and 64π²/35 in the
+    /// unit ball, against the distribution of distances between two points, p(r) of a disk and of a ball.
     #[test]
     fn double_integrals_of_the_appendix() {
         let n = 20_000;
@@ -219,8 +223,8 @@ mod tests {
         assert!((found - 64.0 * PI * PI / 35.0).abs() < 1e-5, "{found}");
     }
 
-    /// `reference/ch2/lattice_moduli.csv`, rows of other horizons: C₁₁₁₁, C₁₁₂₂, E along \[100\], ν, E along \[110\], Zener's
-    /// ratio and the isotropic mean.
+    /// `reference/ch2/lattice_moduli.csv`, rows of other horizons: C₁₁₁₁, C₁₁₂₂, E along \[100\], ν, E along
+    /// \[110\], Zener's ratio and the isotropic mean.
     #[test]
     #[rustfmt::skip]
     fn lattice_moduli_at_other_horizons() {
@@ -253,8 +257,9 @@ mod tests {
         }
     }
 
-    /// What (A.18) and (A.38) print are 2Ω times the single-point integrals of (2.77) and (2.73): ∫ ξξξξ/|ξ|³ dV has the
-    /// coefficients tπR³/12 and πR⁴/15 that the calibration needs, by quadrature of its components.
+    /// What (A.18) and (A.38) print are 2Ω times the single-point integrals of (2.77) and (2.73): ∫ ξξξξ/|ξ|³
+    /// dV has the coefficients tπR³/12 and πR⁴/15 that the calibration needs, by quadrature of its
+    /// components.
     #[test]
     fn single_point_integrals() {
         let n = 2000;

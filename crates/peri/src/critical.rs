@@ -17,7 +17,8 @@ use polycore::units::{EnergyPerArea, Stress};
 use serde::Deserialize;
 use std::f64::consts::PI;
 
-/// As written in a scene: one of `percent_over_contour` (with `interpretation`), `stretch`, `fracture_energy`.
+/// As written in a scene: one of `percent_over_contour` (with `interpretation`), `stretch`,
+/// `fracture_energy`.
 #[derive(Clone, Copy, Debug, Default, Deserialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
@@ -30,14 +31,16 @@ pub struct Critical {
     pub stretch: Option<f64>,
     /// Fracture energy G, from which the stretch follows: the mesh-objective choice.
     pub fracture_energy: Option<EnergyPerArea>,
-    /// What the fracture energy of a bond law is the energy of; default: `tearing`, of an inclusion that of the rest.
+    /// What the fracture energy of a bond law is the energy of; default: `tearing`, of an inclusion that of
+    /// the rest.
     pub convention: Option<Convention>,
-    /// Uniaxial tensile strength of a solid, force over the undeformed section, beside its fracture energy: bonds soften.
+    /// Uniaxial tensile strength of a solid, force over the undeformed section, beside its fracture energy:
+    /// bonds soften.
     pub strength: Option<Stress>,
 }
 
-/// Interpretations of f√n̄, R1 to R4 in the documents, (formulation.md, Critical stretch). (2.38) is the trace of an isochoric deformation: the bond stretch
-/// belongs on its right, the chain stretch g on its left.
+/// Interpretations of f√n̄, R1 to R4 in the documents, (formulation.md, Critical stretch). (2.38) is the
+/// trace of an isochoric deformation: the bond stretch belongs on its right, the chain stretch g on its left.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
@@ -99,9 +102,10 @@ pub struct Context<'a> {
     pub convention: Convention,
 }
 
-/// Energy density Y_c, J/m³, beyond which bonds of a solid break that has the fracture energy G, J/m²: G/(c Σ ŵ|ξ₁|), with the sum over
-/// the largest family of the body. c = 1.13 + 0.98/m, m the horizon over the spacing, makes the crack of a pure-shear strip run at G
-/// (cases/ch5/rubber-tearing): bonds ahead of a tip release less than the mean of those that a crack cuts.
+/// Energy density Y_c, J/m³, beyond which bonds of a solid break that has the fracture energy G, J/m²: G/(c Σ
+/// ŵ|ξ₁|), with the sum over the largest family of the body. c = 1.13 + 0.98/m, m the horizon over the
+/// spacing, makes the crack of a pure-shear strip run at G (cases/ch5/rubber-tearing): bonds ahead of a tip
+/// release less than the mean of those that a crack cuts.
 pub fn energy_limit<const D: usize>(bonds: &dyn BodyGeometry<D>, fracture_energy: f64) -> f64 {
     let (reach, calibration) = share_of_crack(bonds);
     fracture_energy / (calibration * reach)
@@ -124,13 +128,14 @@ fn share_of_crack<const D: usize>(bonds: &dyn BodyGeometry<D>) -> (f64, f64) {
     (most[1] / most[0], 1.13 + 0.98 * bonds.spacing() / bonds.horizon())
 }
 
-/// c of bonds of ductility 1, 2, 4, and 8 or more, over that of bonds that break at once: softening spreads the load over what is ahead
-/// of the tip. Between them it is linear in log₂ e_f. From pure-shear strips of rubber and of small strains: theory/fracture.md of the guide.
+/// c of bonds of ductility 1, 2, 4, and 8 or more, over that of bonds that break at once: softening spreads
+/// the load over what is ahead of the tip. Between them it is linear in log₂ e_f. From pure-shear strips of
+/// rubber and of small strains: theory/fracture.md of the guide.
 const CALIBRATION: [f64; 4] = [1.0, 0.85, 0.73, 0.62];
 
-/// Bonds with the strength whose uniform state has the energy density Y₀ = `onset`, J/m³, and the fracture energy G, J/m²: Y_c =
-/// G/(c(Y_c/Y₀) Σ ŵ|ξ₁|), see [`energy_limit`]. The limit Y_c of bonds that break at once where it is below Y₀, which such bonds reach
-/// before their strength.
+/// Bonds with the strength whose uniform state has the energy density Y₀ = `onset`, J/m³, and the fracture
+/// energy G, J/m²: Y_c = G/(c(Y_c/Y₀) Σ ŵ|ξ₁|), see [`energy_limit`]. The limit Y_c of bonds that break at
+/// once where it is below Y₀, which such bonds reach before their strength.
 ///
 /// # Errors
 /// That limit.
@@ -201,7 +206,8 @@ impl Critical {
     /// The critical bond stretch.
     ///
     /// # Errors
-    /// [`Error::Parameter`] where none or several of the alternatives are given, or a value is out of its domain.
+    /// [`Error::Parameter`] where none or several of the alternatives are given, or a value is out of its
+    /// domain.
     pub fn resolve(&self, context: &Context) -> Result<f64, Error> {
         let fault =
             |name, found, allowed: &str| Err(Error::Parameter { name, found, allowed: allowed.to_owned() });
@@ -244,9 +250,9 @@ impl Critical {
     }
 }
 
-/// Fracture energy G, J/m², of a critical stretch, with Φ = ∫₁^{λc} t dλ/kθ. [`Convention::Tearing`]: κkθΦ Σ_J w V_J |ξ_e||ξ| of a
-/// [`Crossing`]; [`Convention::Bonds`]: tδ⁴kθΦ in a sheet, (2π/5)δ⁵kθΦ in a solid; [`Convention::Softening`]: kθΦ Σ_J w V_J |ξ_e||ξ| of bonds
-/// that soften and bear nothing at this stretch.
+/// Fracture energy G, J/m², of a critical stretch, with Φ = ∫₁^{λc} t dλ/kθ. [`Convention::Tearing`]: κkθΦ
+/// Σ_J w V_J |ξ_e||ξ| of a [`Crossing`]; [`Convention::Bonds`]: tδ⁴kθΦ in a sheet, (2π/5)δ⁵kθΦ in a solid;
+/// [`Convention::Softening`]: kθΦ Σ_J w V_J |ξ_e||ξ| of bonds that soften and bear nothing at this stretch.
 pub fn fracture_energy(context: &Context, convention: Convention, stretch: f64) -> f64 {
     let energy = match convention {
         Convention::Softening => softened_energy(context.law, stretch, stretch),
@@ -290,7 +296,8 @@ impl Toughness {
     }
 }
 
-/// The stretch at which bonds have stored their shares of G, by bisection: energy grows with stretch in tension.
+/// The stretch at which bonds have stored their shares of G, by bisection: energy grows with stretch in
+/// tension.
 fn stretch_of_energy(context: &Context, convention: Convention, energy: f64) -> Result<f64, Error> {
     let fault = |allowed: &str| {
         Err(Error::Parameter { name: "critical.fracture_energy", found: energy, allowed: allowed.to_owned() })
@@ -372,7 +379,8 @@ mod tests {
         }
     }
 
-    /// For the linear bond: G = (2π/5)δ⁵kθ·(3/2)s² = (6/5)·E·s²δ... against Silling & Askari's G = 9Ks²δ/5 ... in 3D.
+    /// For the linear bond: G = (2π/5)δ⁵kθ·(3/2)s² = (6/5)·E·s²δ... against Silling & Askari's G = 9Ks²δ/5
+    /// ... in 3D.
     #[test]
     fn linear_bond_has_the_textbook_fracture_energy() {
         let (e, horizon, s) = (1e7, 0.03, 0.02);
@@ -385,8 +393,8 @@ mod tests {
         assert!((found / exact - 1.0).abs() < 1e-12);
     }
 
-    /// `reference/ch2/s8_G.py`: G = 2.67 N/mm, E = 0.6 N/mm², δ = 6.03 mm give Φ = 2πG/(3Eδ), and a linear bond breaks at
-    /// 1 + √(2Φ/3).
+    /// `reference/ch2/s8_G.py`: G = 2.67 N/mm, E = 0.6 N/mm², δ = 6.03 mm give Φ = 2πG/(3Eδ), and a linear
+    /// bond breaks at 1 + √(2Φ/3).
     #[test]
     fn critical_stretch_of_a_fracture_energy() {
         let (e, horizon, thickness) = (0.6e6, 6.03e-3, 3e-3);

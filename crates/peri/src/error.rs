@@ -46,7 +46,8 @@ pub enum Error {
         /// Relative residual requested.
         needed: f64,
     },
-    /// Loads that nothing can balance: a part of the body bears a force and hangs on nothing, from the start or once the body is torn.
+    /// Loads that nothing can balance: a part of the body bears a force and hangs on nothing, from the start
+    /// or once the body is torn.
     #[error(
         "no equilibrium {}: {why}; {}",
         if *torn { format!("after {step} steps, torn at load factor {factor:.4}") } else { format!("at load factor {factor:.4}") },

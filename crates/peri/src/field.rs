@@ -1,9 +1,10 @@
-//! Vector fields stored component by component (structure of arrays), and their fixed division into work items.
+//! Vector fields stored component by component (structure of arrays), and their fixed division into work
+//! items.
 
 use std::ops::Range;
 
-/// Sites per work item. Fixed by the data, never by the number of threads: sums taken item by item give the same
-/// bits on any number of threads. A multiple of [`crate::bonds::TILE`].
+/// Sites per work item. Fixed by the data, never by the number of threads: sums taken item by item give the
+/// same bits on any number of threads. A multiple of [`crate::bonds::TILE`].
 pub const CHUNK: usize = 4096;
 
 /// A vector field of dimension `D` on `sites` storage sites.

@@ -1,4 +1,5 @@
-//! Bodies from shapes: boxes, disks, balls, cylinders, added and cut in order; cracks of zero width; point clouds.
+//! Bodies from shapes: boxes, disks, balls, cylinders, added and cut in order; cracks of zero width; point
+//! clouds.
 
 mod cuts;
 mod gaps;
@@ -137,17 +138,18 @@ pub fn bounds<const D: usize>(operations: &[Operation<D>]) -> Option<([f64; D], 
         })
 }
 
-/// Cells along each axis of a lattice of `spacing` over a box, as real numbers: they may be too many to count.
+/// Cells along each axis of a lattice of `spacing` over a box, as real numbers: they may be too many to
+/// count.
 pub fn cell_counts<const D: usize>(low: [f64; D], high: [f64; D], spacing: f64) -> [f64; D] {
     std::array::from_fn(|d| ((high[d] - low[d]) / spacing).round().max(1.0))
 }
 
-/// The lattice of cells whose centres lie inside the body. Cells are centred: the first centre lies half a spacing
-/// inside the lower corner of the bounding box.
+/// The lattice of cells whose centres lie inside the body. Cells are centred: the first centre lies half a
+/// spacing inside the lower corner of the bounding box.
 ///
 /// # Errors
-/// [`Error::Geometry`] where the spacing is not positive, nothing is added, no centre is inside, or the cells are more than 2·10⁹ or than
-/// the memory that is left, of which then nothing is asked for.
+/// [`Error::Geometry`] where the spacing is not positive, nothing is added, no centre is inside, or the cells
+/// are more than 2·10⁹ or than the memory that is left, of which then nothing is asked for.
 pub fn lattice<const D: usize>(
     operations: &[Operation<D>],
     spacing: f64,
@@ -206,8 +208,9 @@ pub(crate) fn refuse_too_large(spacing: f64, [cells, most]: [f64; 2], bytes: f64
 
 /// The regular lattice that points of one volume lie on; `None` where they lie on none.
 ///
-/// The spacing is the edge of a particle's cube (plane bodies: square). Every coordinate must be within 1e-9 spacings of
-/// the lattice, no cell may hold two points, and along every axis at least half of the points have a next neighbour.
+/// The spacing is the edge of a particle's cube (plane bodies: square). Every coordinate must be within 1e-9
+/// spacings of the lattice, no cell may hold two points, and along every axis at least half of the points
+/// have a next neighbour.
 pub fn recognise<const D: usize>(points: &[[f64; D]], volumes: &[f64], thickness: f64) -> Option<Lattice<D>> {
     let volume = *volumes.first()?;
     if volumes.iter().any(|&v| v != volume) {

@@ -1,4 +1,5 @@
-//! Models in a few lines: a [`Body`], a material and loads make a [`Simulation`], which any [`Method`] solves.
+//! Models in a few lines: a [`Body`], a material and loads make a [`Simulation`], which any [`Method`]
+//! solves.
 
 mod body;
 mod rubber;
@@ -18,7 +19,8 @@ use crate::solver::{
 use crate::stress::{self, BallVolume, Loaded, Measure, Missing, Tensor};
 use std::sync::Arc;
 
-/// What a body can be made of: a [`Material`], or a description that becomes one in a body, such as [`Rubber`].
+/// What a body can be made of: a [`Material`], or a description that becomes one in a body, such as
+/// [`Rubber`].
 pub trait IntoMaterial<const D: usize> {
     /// The material.
     type Material: Material<D> + Clone;
@@ -47,7 +49,8 @@ type Region<const D: usize> = Box<dyn Fn(&[[f64; D]]) -> Result<Vec<bool>, Error
 
 /// A body, its material and its loads, before anything is built.
 ///
-/// A region is a function of the reference position: `|[x, _]| x < 3e-3` holds every particle with X₁ below 3 mm.
+/// A region is a function of the reference position: `|[x, _]| x < 3e-3` holds every particle with X₁ below 3
+/// mm.
 pub struct Model<const D: usize, M> {
     body: Body<D>,
     material: M,
@@ -78,8 +81,8 @@ impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
         self.support(region, Support { displacement: displacement.map(Some), body_force: [0.0; D] })
     }
 
-    /// Turns a region about an axis, along the arc: by the whole angle at load factor 1. Of turned regions that others overlap,
-    /// nothing else may be prescribed.
+    /// Turns a region about an axis, along the arc: by the whole angle at load factor 1. Of turned regions
+    /// that others overlap, nothing else may be prescribed.
     pub fn rotate(mut self, region: impl Fn([f64; D]) -> bool + 'static, rotation: Rotation<D>) -> Self {
         self.rotations.push((self.regions.len(), rotation));
         self.displace(region, [0.0; D])
@@ -95,8 +98,8 @@ impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
         self.support_where(move |points| Ok(points.iter().map(|&point| region(point)).collect()), support)
     }
 
-    /// As [`Self::support`], of a region that sees all particles at once, in the order of [`Simulation::displacements`]: gives
-    /// for each whether it belongs to it.
+    /// As [`Self::support`], of a region that sees all particles at once, in the order of
+    /// [`Simulation::displacements`]: gives for each whether it belongs to it.
     pub fn support_where(
         mut self,
         region: impl Fn(&[[f64; D]]) -> Result<Vec<bool>, Error> + 'static,
@@ -125,8 +128,8 @@ impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
         self
     }
 
-    /// A rigid plane that the body cannot pass, or to which it is tied. Explicit dynamics take larger steps with a
-    /// [`Plane::stiffness`] of 2.
+    /// A rigid plane that the body cannot pass, or to which it is tied. Explicit dynamics take larger steps
+    /// with a [`Plane::stiffness`] of 2.
     pub fn plane(mut self, plane: Plane<D>) -> Self {
         self.planes.push(plane);
         self
@@ -135,8 +138,8 @@ impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
     /// Builds particles, bonds, material and loads.
     ///
     /// # Errors
-    /// [`Error::Geometry`] for a body without particles or a region without any; [`Error::Parameter`] for a parameter of the
-    /// material or of contact out of its domain.
+    /// [`Error::Geometry`] for a body without particles or a region without any; [`Error::Parameter`] for a
+    /// parameter of the material or of contact out of its domain.
     pub fn build(self) -> Result<Simulation<D, M::Material>, Error> {
         let bonds = self.body.build()?;
         let (material, critical) = self.material.into_material(&self.body, &bonds)?;
@@ -191,7 +194,8 @@ pub struct Simulation<const D: usize, M> {
     pub bonds: LatticeBonds<D>,
     /// The state that is reached. Its velocity may be set before a dynamic solution.
     pub state: State<D>,
-    /// Load factor at the end of each step; more may be added, for the next call of [`Self::solve`]. Not used in dynamics.
+    /// Load factor at the end of each step; more may be added, for the next call of [`Self::solve`]. Not used
+    /// in dynamics.
     pub factors: Vec<f64>,
     material: M,
     loads: Loads<D>,
@@ -210,8 +214,8 @@ impl<const D: usize, M: Material<D> + Clone> Simulation<D, M> {
         self.solve_with(method, |_| Ok(()))
     }
 
-    /// [`Self::solve`]; `finished` sees the state after every load step, equilibrium in which bonds broke or row of a dynamic
-    /// history, and may stop the solution by an error.
+    /// [`Self::solve`]; `finished` sees the state after every load step, equilibrium in which bonds broke or
+    /// row of a dynamic history, and may stop the solution by an error.
     ///
     /// # Errors
     /// As [`Self::solve`], and those of `finished`.

@@ -24,7 +24,8 @@ pub struct Face<const D: usize> {
 enum Patch<const D: usize> {
     /// Faces with normals along an axis.
     Flat { axis: usize, outward: f64 },
-    /// Part of a circle, a sphere, or a circular cylinder along `axis`; `outward` is −1 for the wall of a hole.
+    /// Part of a circle, a sphere, or a circular cylinder along `axis`; `outward` is −1 for the wall of a
+    /// hole.
     Round { centre: [f64; D], radius: f64, axis: Option<usize>, outward: f64 },
 }
 
@@ -34,7 +35,8 @@ impl<const D: usize> Patch<D> {
         std::array::from_fn(|d| if Some(d) == axis { 0.0 } else { point[d] - centre[d] })
     }
 
-    /// Distance along the surface between a face and the point of the surface above a particle, and depth of the particle, m.
+    /// Distance along the surface between a face and the point of the surface above a particle, and depth of
+    /// the particle, m.
     fn reach(&self, face: &Face<D>, point: [f64; D]) -> (f64, f64) {
         match *self {
             Self::Flat { axis, outward } => {
@@ -68,7 +70,8 @@ pub struct Surface<const D: usize> {
 }
 
 impl<const D: usize> Surface<D> {
-    /// Samples the boundary of shapes: flat sides above the columns of the lattice, round ones at equal arcs of about `spacing`, m.
+    /// Samples the boundary of shapes: flat sides above the columns of the lattice, round ones at equal arcs
+    /// of about `spacing`, m.
     pub fn of_shapes(operations: &[Operation<D>], spacing: f64) -> Self {
         let mut surface = Self { faces: Vec::new(), patches: Vec::new(), bounds: 0 };
         let Some((low, high)) = bounds(operations) else { return surface };
@@ -116,7 +119,8 @@ impl<const D: usize> Surface<D> {
         Self { faces, patches, bounds: 0 }
     }
 
-    /// Takes flat sides whose patches are those of [`Self::of_lattice`]: 2d and 2d + 1 for the normals along −d and d.
+    /// Takes flat sides whose patches are those of [`Self::of_lattice`]: 2d and 2d + 1 for the normals along
+    /// −d and d.
     pub(crate) fn of_sides(faces: Vec<Face<D>>) -> Self {
         Self { faces, patches: Self::axes(), bounds: 0 }
     }
@@ -145,7 +149,8 @@ impl<const D: usize> Surface<D> {
         &self.faces
     }
 
-    /// Distance along the surface between a face and the point of the surface above a particle, and depth of the particle, m.
+    /// Distance along the surface between a face and the point of the surface above a particle, and depth of
+    /// the particle, m.
     pub fn reach(&self, face: &Face<D>, point: [f64; D]) -> (f64, f64) {
         self.patches[face.patch as usize].reach(face, point)
     }
@@ -216,7 +221,8 @@ impl<const D: usize> Surface<D> {
         }
     }
 
-    /// Adds the points of both sides of a shape that are flat across an axis, above the columns of the lattice.
+    /// Adds the points of both sides of a shape that are flat across an axis, above the columns of the
+    /// lattice.
     fn flat(&mut self, shape: &Shape<D>, axis: usize, ends: (f64, f64), outward: f64, columns: &Columns<D>) {
         let middle = 0.5 * (ends.0 + ends.1);
         for (end, sign) in [(ends.0, -outward), (ends.1, outward)] {

@@ -54,8 +54,9 @@ impl StretchScan {
     }
 }
 
-/// All intact bonds beyond the `critical` stretch of the weaker of their ends, each from both of them: λ² − 1 =
-/// η·(2ξ + η)/|ξ|² has the same bits from either. `seen` is what [`BondForces::force`] has collected of this displacement.
+/// All intact bonds beyond the `critical` stretch of the weaker of their ends, each from both of them: λ² −
+/// 1 = η·(2ξ + η)/|ξ|² has the same bits from either. `seen` is what [`BondForces::force`] has collected of
+/// this displacement.
 pub fn overstretched<const D: usize, B: BondForces<D> + ?Sized>(
     bonds: &B,
     displacement: &Field<D>,
@@ -125,7 +126,8 @@ pub fn fragments<const D: usize, B: BodyGeometry<D> + ?Sized>(bonds: &B) -> Vec<
     fragments
 }
 
-/// The first site of the part that each site hangs together with by intact bonds that `holds` accepts, by their sites.
+/// The first site of the part that each site hangs together with by intact bonds that `holds` accepts, by
+/// their sites.
 pub fn components<const D: usize, B: BodyGeometry<D> + ?Sized>(
     bonds: &B,
     holds: impl Fn(usize, usize) -> bool,

@@ -6,11 +6,13 @@ use rayon::prelude::*;
 /// Cells farther than this from the first are one: there, positions are not known to a cell.
 const FARTHEST: i64 = 1 << 40;
 
-/// Points in cells of equal edge. Cells without points are not stored: a point far from all others costs nothing.
+/// Points in cells of equal edge. Cells without points are not stored: a point far from all others costs
+/// nothing.
 pub struct CellGrid<const D: usize> {
     low: [f64; D],
     edge: f64,
-    /// Cells that hold points, ascending; the last axis comes first, so that rows along the first axis lie together.
+    /// Cells that hold points, ascending; the last axis comes first, so that rows along the first axis lie
+    /// together.
     cells: Vec<[i64; D]>,
     /// The greatest cell along each axis.
     last: [i64; D],
@@ -57,7 +59,8 @@ impl<const D: usize> CellGrid<D> {
         self.starts.windows(2).map(|ends| &self.members[ends[0]..ends[1]])
     }
 
-    /// Visits the cells from one on, by their numbers, that are at most `rings` cells away from it, with how many.
+    /// Visits the cells from one on, by their numbers, that are at most `rings` cells away from it, with how
+    /// many.
     pub fn around(&self, number: usize, rings: i64, mut visit: impl FnMut(usize, i64)) {
         let own = self.cells[number];
         let away = |cell: &[i64; D]| (0..D).map(|d| (cell[d] - own[d]).abs()).max().unwrap_or(0);

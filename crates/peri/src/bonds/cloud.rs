@@ -70,8 +70,8 @@ impl<const D: usize> CloudBonds<D> {
     /// Bonds of all pairs within `horizon`, less those that cross a cut.
     ///
     /// # Errors
-    /// [`Error::Geometry`] for an empty cloud, positions that are not finite, volumes too few, too many or not positive,
-    /// two particles in one place, or a horizon that is not positive.
+    /// [`Error::Geometry`] for an empty cloud, positions that are not finite, volumes too few, too many or
+    /// not positive, two particles in one place, or a horizon that is not positive.
     pub fn new(
         points: &[[f64; D]],
         volumes: &[f64],

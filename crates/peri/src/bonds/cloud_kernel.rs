@@ -1,7 +1,8 @@
 //! The cloud kernel: the neighbours of one particle gathered a vector at a time.
 //!
-//! A particle lies in one or two rows of four numbers. Rows of as many bonds as a vector has lanes are loaded whole and turned into
-//! columns by shuffles: with AVX2 and AVX-512 the kernel takes 0.7 of the time that it takes number by number.
+//! A particle lies in one or two rows of four numbers. Rows of as many bonds as a vector has lanes are loaded
+//! whole and turned into columns by shuffles: with AVX2 and AVX-512 the kernel takes 0.7 of the time that it
+//! takes number by number.
 
 use super::kernel::{Pass, law};
 use super::real::Real;
@@ -17,7 +18,8 @@ pub const GROUP: usize = 8;
 /// Numbers of a row.
 const ROW: usize = 4;
 
-/// Positions and displacements of consecutive particles: (x, y, u_x, u_y) in a plane, in space (x, y, z, 0) and (u_x, u_y, u_z, 0).
+/// Positions and displacements of consecutive particles: (x, y, u_x, u_y) in a plane, in space (x, y, z, 0)
+/// and (u_x, u_y, u_z, 0).
 #[derive(Default)]
 pub struct Rows {
     /// The first particle.
@@ -131,8 +133,8 @@ impl<const D: usize, const P: usize, const Q: usize> Pass<D> for CloudPass<'_, D
             let mut sum = [zero; D];
             for first in (starts[own]..starts[own + 1]).step_by(lanes) {
                 let group = &neighbours[first..first + lanes];
-                // SAFETY: the rows hold every neighbour of this work item: those of all particles, of which there is one row or two each
-                // (asserted in `CloudBonds::force`), or those of `met_by`
+                // SAFETY: the rows hold every neighbour of this work item: those of all particles, of which
+                // there is one row or two each (asserted in `CloudBonds::force`), or those of `met_by`
                 let (x, u) = unsafe {
                     let whole = columns::<S, D>(simd, rows, 0, group, &order);
                     let (mut x, mut u) = ([zero; D], [zero; D]);
@@ -218,7 +220,8 @@ fn turned<S: Simd>(simd: S, raw: &[[f64; ROW]; GROUP]) -> [S::f64s; ROW] {
     simd.deinterleave_shfl_f64s(vectors)
 }
 
-/// The lane of each row in its column: bonds are loaded in that order, so that columns have them in the order of the lists.
+/// The lane of each row in its column: bonds are loaded in that order, so that columns have them in the order
+/// of the lists.
 #[inline(always)]
 fn order<S: Simd>(simd: S) -> [usize; GROUP] {
     let mut raw = [[0.0; ROW]; GROUP];

@@ -1,4 +1,5 @@
-//! Both passes of materials whose forces are linear in a bond, on a cloud: moments of a family's displacements, and forces.
+//! Both passes of materials whose forces are linear in a bond, on a cloud: moments of a family's
+//! displacements, and forces.
 //!
 //! What a neighbour brings lies together in four lanes, so that plain loops become vector instructions.
 
@@ -100,8 +101,8 @@ impl<const D: usize> CloudBonds<D> {
         Arch::new().dispatch(MomentPass { lists: self.lists(), places, chunk, visit });
     }
 
-    /// Σ_J (V_J/|ξ|²)[(A_I + A_J) η + (S_I + S_J) ξ + (P_I + P_J)(θ_J − θ_I)] of the particles of work item `chunk`, with
-    /// [`CloudPlaces::stride`] `terms` a particle.
+    /// Σ_J (V_J/|ξ|²)[(A_I + A_J) η + (S_I + S_J) ξ + (P_I + P_J)(θ_J − θ_I)] of the particles of work item
+    /// `chunk`, with [`CloudPlaces::stride`] `terms` a particle.
     pub fn linear_force(
         &self,
         places: &CloudPlaces<D>,

@@ -20,7 +20,8 @@ pub(super) struct NeighbourLists {
 }
 
 impl NeighbourLists {
-    /// Lists all pairs within `horizon`, less those that cross a cut or a gap; `order` is the index of each point in the input.
+    /// Lists all pairs within `horizon`, less those that cross a cut or a gap; `order` is the index of each
+    /// point in the input.
     ///
     /// # Errors
     /// [`Error::Geometry`] for two particles in one place.

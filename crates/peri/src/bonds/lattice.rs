@@ -1,4 +1,5 @@
-//! A regular lattice of particles: one stencil of offsets, a bit mask of intact bonds per particle, no neighbour list.
+//! A regular lattice of particles: one stencil of offsets, a bit mask of intact bonds per particle, no
+//! neighbour list.
 
 mod connect;
 mod mixed;
@@ -39,7 +40,8 @@ pub struct LatticeBonds<const D: usize> {
     factors: Option<Field<D>>,
     /// Whether they are the same along all axes.
     even: bool,
-    /// Interior value of the factors, a part of every stencil bond's weight; the stored factors are relative to it.
+    /// Interior value of the factors, a part of every stencil bond's weight; the stored factors are relative
+    /// to it.
     interior_factor: f64,
     kernel: Option<Box<dyn LatticeKernel<D>>>,
     /// A law that only a table represents, and kθ.
@@ -53,8 +55,9 @@ impl<const D: usize> LatticeBonds<D> {
     /// Bonds of all occupied cells within `ratio` spacings, less those that cross a cut.
     ///
     /// # Errors
-    /// [`Error::Geometry`] where no cell is occupied, the list of occupied cells does not fit the box, the spacing is not
-    /// positive, the horizon is not finite or reaches no neighbour, or bonds need more memory than is left.
+    /// [`Error::Geometry`] where no cell is occupied, the list of occupied cells does not fit the box, the
+    /// spacing is not positive, the horizon is not finite or reaches no neighbour, or bonds need more memory
+    /// than is left.
     pub fn new(
         lattice: Lattice<D>,
         ratio: f64,

@@ -8,8 +8,8 @@ use pulp::Simd;
 /// Sites per tile: the unit of the lattice kernel's classification. Storage is padded to a multiple of it.
 pub const TILE: usize = 16;
 
-/// One bond of the stencil with the law's coefficients scaled to its length and stiffness, for `P` numerator and
-/// `Q` denominator coefficients: q·c = E·ΣₖaₖEᵏ/(1 + ΣₖbₖEᵏ⁺¹), E = η·(2ξ + η).
+/// One bond of the stencil with the law's coefficients scaled to its length and stiffness, for `P` numerator
+/// and `Q` denominator coefficients: q·c = E·ΣₖaₖEᵏ/(1 + ΣₖbₖEᵏ⁺¹), E = η·(2ξ + η).
 #[derive(Clone, Copy, Debug)]
 pub struct Row<T, const D: usize, const P: usize, const Q: usize> {
     /// Distance to the neighbour in sites.
@@ -98,8 +98,8 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> Pass<D> for Lattic
         track: Option<&mut StretchRange>,
     ) {
         let length = force[0].len();
-        // SAFETY of the unchecked loads below: a tile is visited only where `classes` says that it holds a bond,
-        // and then every site of it lies at least `guard` ≥ max|shift| from both ends of every slice.
+        // SAFETY of the unchecked loads below: a tile is visited only where `classes` says that it holds a
+        // bond, and then every site of it lies at least `guard` ≥ max|shift| from both ends of every slice.
         assert!(start.is_multiple_of(TILE) && length.is_multiple_of(TILE));
         let sites = self.tiles.displacement[0].len();
         assert!(start + length <= sites && self.tiles.displacement.iter().all(|c| c.len() == sites));
@@ -226,7 +226,8 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> LatticePass<'_, T,
         unsafe { self.pass_on(simd, out, sum, true) };
     }
 
-    /// Bonds masked by their bits, where particles differ in them, and weighted by their ends' factors; those that no particle of the block has are left out.
+    /// Bonds masked by their bits, where particles differ in them, and weighted by their ends' factors; those
+    /// that no particle of the block has are left out.
     ///
     /// # Safety
     /// As [`Self::full`].
@@ -333,7 +334,8 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> LatticePass<'_, T,
         *seen = [low, high];
     }
 
-    /// Adds forces to those of V vectors: after each run where it has an end, else at the end of all; what is left to add.
+    /// Adds forces to those of V vectors: after each run where it has an end, else at the end of all; what is
+    /// left to add.
     ///
     /// # Safety
     /// `out` takes V·lanes values.
@@ -428,8 +430,8 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> Row<T, D, P, Q> {
         law::<T, S, P, Q>(simd, e, self.clamp, self.constant, &self.numerator, &self.denominator)
     }
 
-    /// Weight of a bond from the correction factors g of its two ends, (Σ_d (n_d/ḡ_d)²)^(−1/2), ḡ = ½(g_I + g_J); ḡ where
-    /// they are even.
+    /// Weight of a bond from the correction factors g of its two ends, (Σ_d (n_d/ḡ_d)²)^(−1/2), ḡ = ½(g_I +
+    /// g_J); ḡ where they are even.
     ///
     /// # Safety
     /// `here` and `there` are followed by a vector's width in every slice.

@@ -1,4 +1,5 @@
-//! Sums over the bonds of a lattice without forces: stretches, and energies, each bond seen from one of its ends.
+//! Sums over the bonds of a lattice without forces: stretches, and energies, each bond seen from one of its
+//! ends.
 
 use super::lattice_kernel::{Class, TILE, Tiles};
 use crate::potential::{StretchRange, TangentTable};
@@ -41,8 +42,8 @@ pub struct Spans<'a, const D: usize> {
 }
 
 impl<const D: usize> Spans<'_, D> {
-    /// Calls `add` for the tiles of some sites that hold bonds: with the first site, and which of the first `count` bonds of the stencil
-    /// any of the particles has.
+    /// Calls `add` for the tiles of some sites that hold bonds: with the first site, and which of the first
+    /// `count` bonds of the stencil any of the particles has.
     #[inline(always)]
     fn tiles<A: Add<D>>(&self, sites: Range<usize>, count: usize, add: &mut A) {
         let mut present = Vec::with_capacity(count);
@@ -94,7 +95,8 @@ impl<const D: usize> Spans<'_, D> {
         }
     }
 
-    /// The bonds beyond e = `least` that begin in these sites, of one direction each: by site and bond of the stencil, from both ends.
+    /// The bonds beyond e = `least` that begin in these sites, of one direction each: by site and bond of the
+    /// stencil, from both ends.
     pub fn beyond(&self, sites: Range<usize>, least: f64) -> Vec<[u32; 2]> {
         let mut found = Beyond { least, bonds: Vec::new() };
         self.sum(sites, self.spans.len() / 2, &mut found);
@@ -108,8 +110,8 @@ impl<const D: usize> Spans<'_, D> {
         found.total
     }
 
-    /// Of each of these sites, whole tiles: Σ (2 share V/|ξ|)·max(table(e), least)·(1 + max_{d≠e} |n_d n_e|) over all its bonds,
-    /// n the direction of the deformed bond.
+    /// Of each of these sites, whole tiles: Σ (2 share V/|ξ|)·max(table(e), least)·(1 + max_{d≠e} |n_d n_e|)
+    /// over all its bonds, n the direction of the deformed bond.
     pub fn stiffness(&self, sites: Range<usize>, volume: f64, table: &TangentTable, least: f64) -> Vec<f64> {
         let sums = vec![0.0; sites.len()];
         let mut found = Stiffness { first: sites.start, volume, table, least, sums };

@@ -1,4 +1,5 @@
-//! Sums over the bonds of a lattice: energies, and both passes of materials whose forces are linear in a bond.
+//! Sums over the bonds of a lattice: energies, and both passes of materials whose forces are linear in a
+//! bond.
 
 use super::LatticeBonds;
 use super::kernel::dispatch;
@@ -39,8 +40,8 @@ impl<const D: usize> LatticeBonds<D> {
         self.stencil().offsets.iter().enumerate().map(row).collect()
     }
 
-    /// Σ_J (V_J/|ξ|²)|η|² and Σ_J (V_J/|ξ|²) η⊗ξ of the particles of work item `chunk`, tile by tile: `visit` takes the first site
-    /// of a tile. N = 1 + D²; tiles without bonds are left out.
+    /// Σ_J (V_J/|ξ|²)|η|² and Σ_J (V_J/|ξ|²) η⊗ξ of the particles of work item `chunk`, tile by tile: `visit`
+    /// takes the first site of a tile. N = 1 + D²; tiles without bonds are left out.
     pub fn moments<const N: usize>(
         &self,
         rows: &[LinearRow<D>],
@@ -53,7 +54,8 @@ impl<const D: usize> LatticeBonds<D> {
         linear_kernel::moments(MomentPass { rows, tiles, start, length, visit });
     }
 
-    /// Σ_J (V_J/|ξ|²)[(A_I + A_J) η + (S_I + S_J) ξ] of the particles of work item `chunk`, with `terms` = (A, S rows first).
+    /// Σ_J (V_J/|ξ|²)[(A_I + A_J) η + (S_I + S_J) ξ] of the particles of work item `chunk`, with `terms` =
+    /// (A, S rows first).
     pub fn linear_force<const N: usize>(
         &self,
         rows: &[LinearRow<D>],

@@ -1,4 +1,5 @@
-//! Lattice kernels of materials with two passes: moments of a family's displacements, and forces that are linear in a bond.
+//! Lattice kernels of materials with two passes: moments of a family's displacements, and forces that are
+//! linear in a bond.
 //!
 //! Fields of `N` = 1 + D² components hold a scalar and then a tensor, rows first.
 
@@ -48,7 +49,8 @@ pub struct LinearPass<'a, const D: usize, const N: usize> {
     pub terms: [&'a [f64]; N],
 }
 
-/// Asserts what the unchecked loads of both passes rely on; whether a tile of `base` may be read is asserted there.
+/// Asserts what the unchecked loads of both passes rely on; whether a tile of `base` may be read is asserted
+/// there.
 fn check<const D: usize>(rows: &[LinearRow<D>], tiles: &Tiles<D>, start: usize, length: usize) -> usize {
     let sites = tiles.displacement[0].len();
     assert!(start.is_multiple_of(TILE) && length.is_multiple_of(TILE) && start + length <= sites);

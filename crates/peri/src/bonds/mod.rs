@@ -1,4 +1,5 @@
-//! Who is bonded to whom, and the forces that follow: a regular lattice without a neighbour list, or a cloud with one.
+//! Who is bonded to whom, and the forces that follow: a regular lattice without a neighbour list, or a cloud
+//! with one.
 
 mod breaking;
 mod cells;
@@ -88,7 +89,8 @@ pub fn stretch_range<const D: usize, B: BondForces<D> + ?Sized>(
         .reduce(|| StretchRange::REST, StretchRange::join)
 }
 
-/// The stretches [λ_low, λ_high] of the bonds in a displacement, with a margin for rounding: the range of a fitted law.
+/// The stretches [λ_low, λ_high] of the bonds in a displacement, with a margin for rounding: the range of a
+/// fitted law.
 pub fn covered_stretches<const D: usize>(bonds: &dyn BondForces<D>, displacement: &Field<D>) -> [f64; 2] {
     let range = stretch_range(bonds, displacement);
     [(1.0 + range.low).max(0.0).sqrt() - 1e-3, (1.0 + range.high).sqrt() + 1e-3].map(|s| s.max(1e-3))
@@ -189,8 +191,8 @@ mod tests {
         }
     }
 
-    /// Stretches across the knee of the chain force need a table: the plain loop, on both representations, against the
-    /// exact law bond by bond.
+    /// Stretches across the knee of the chain force need a table: the plain loop, on both representations,
+    /// against the exact law bond by bond.
     #[test]
     fn laws_that_need_a_table() {
         let law = Law::ChainOffset.build(720.0, 1200.0, false).unwrap();

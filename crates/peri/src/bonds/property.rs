@@ -2,8 +2,8 @@
 
 use super::BodyGeometry;
 
-/// A property of the particles: one value for all, which costs nothing, or a value for each site. A number is one: `3.0.into()`.
-/// Bonds may be weaker than both of their ends.
+/// A property of the particles: one value for all, which costs nothing, or a value for each site. A number is
+/// one: `3.0.into()`. Bonds may be weaker than both of their ends.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Property {
     /// Site by site; empty where all particles have `least`.

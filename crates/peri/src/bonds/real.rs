@@ -2,7 +2,8 @@
 
 use pulp::Simd;
 
-/// A number of a lattice kernel, and vectors of it. Sums of forces are taken in double precision in either case.
+/// A number of a lattice kernel, and vectors of it. Sums of forces are taken in double precision in either
+/// case.
 pub trait Real: Copy + Send + Sync + 'static {
     /// A vector with instructions `S`.
     type Vector<S: Simd>: Copy;

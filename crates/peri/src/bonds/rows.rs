@@ -102,7 +102,8 @@ impl Rational {
     }
 }
 
-/// The law of one bond of the stencil: its coefficients in E = |ξ|² e, times the bond's stiffness; see [`Row`].
+/// The law of one bond of the stencil: its coefficients in E = |ξ|² e, times the bond's stiffness; see
+/// [`Row`].
 pub struct ScaledLaw {
     /// 1/|ξ|².
     pub inverse_square: f64,
@@ -204,7 +205,8 @@ pub fn cloud_kernel<const D: usize>(fit: &KernelFit) -> Option<Box<dyn CloudKern
     if D == 2 { same(plane_cloud(&rational)?) } else { same(solid_cloud(&rational)?) }
 }
 
-// these six are not generic, so that the kernels are compiled in this crate alone and not in every program that makes bonds
+// these six are not generic, so that the kernels are compiled in this crate alone and not in every program
+// that makes bonds
 
 fn plane_lattice(law: &Rational, stencil: Vec<StencilBond<2>>) -> Option<Box<dyn LatticeKernel<2>>> {
     for_size!(2, law, double_rows(law, &stencil))

@@ -16,7 +16,8 @@ pub struct Softened {
     pub integrity: f64,
 }
 
-/// The softened bonds of a body, each from both of its ends, by site and index. All others are intact or severed: they are few.
+/// The softened bonds of a body, each from both of its ends, by site and index. All others are intact or
+/// severed: they are few.
 #[derive(Clone, Debug, Default)]
 pub struct Softening {
     bonds: Vec<Softened>,

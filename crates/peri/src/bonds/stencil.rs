@@ -36,7 +36,8 @@ impl<const D: usize> Stencil<D> {
 /// Sites that vectors of kernels take at once, where they are widest.
 const VECTOR: usize = 8;
 
-/// The axes from that on which neighbours follow each other in storage, with `first` in its place and the others in order.
+/// The axes from that on which neighbours follow each other in storage, with `first` in its place and the
+/// others in order.
 fn order<const D: usize>(first: usize) -> [usize; D] {
     std::array::from_fn(|k| match k {
         0 => first,
@@ -44,8 +45,8 @@ fn order<const D: usize>(first: usize) -> [usize; D] {
     })
 }
 
-/// The order of axes in which the particles of a box of cells fill vectors best: a bar of ten particles across fills them along its axis
-/// alone. The first axis comes first where that is nearly as good.
+/// The order of axes in which the particles of a box of cells fill vectors best: a bar of ten particles
+/// across fills them along its axis alone. The first axis comes first where that is nearly as good.
 pub(super) fn fullest<const D: usize>(cells: [usize; D], occupied: &[bool], ratio: f64) -> [usize; D] {
     let vectors = |first: usize| {
         let (strides, guard, sites) = layout(cells, ratio, order(first));
@@ -65,14 +66,16 @@ pub(super) fn fullest<const D: usize>(cells: [usize; D], occupied: &[bool], rati
     order(if 20 * counts[best] < 17 * counts[0] { best } else { 0 })
 }
 
-/// Steps in sites along each axis, empty sites before the first cell, and all sites of a box of cells, for an order of axes.
+/// Steps in sites along each axis, empty sites before the first cell, and all sites of a box of cells, for an
+/// order of axes.
 pub(super) fn layout<const D: usize>(
     cells: [usize; D],
     ratio: f64,
     order: [usize; D],
 ) -> ([usize; D], usize, usize) {
-    // empty cells between rows, so that nothing within twice the horizon and a cell wraps into the next row: stress
-    // measures look that far; odd strides, or rows of a power of two would fall into the same cache sets
+    // empty cells between rows, so that nothing within twice the horizon and a cell wraps into the next row:
+    // stress measures look that far; odd strides, or rows of a power of two would fall into the same cache
+    // sets
     let far = ratio.floor() as usize;
     let mut strides = [1; D];
     for axes in order.windows(2) {
@@ -82,7 +85,8 @@ pub(super) fn layout<const D: usize>(
     (strides, guard, (2 * guard + strides[order[D - 1]] * cells[order[D - 1]]).next_multiple_of(TILE))
 }
 
-/// The fewest sites of a box of cells and a horizon over the spacing, as a real number: a thin box has many more than cells.
+/// The fewest sites of a box of cells and a horizon over the spacing, as a real number: a thin box has many
+/// more than cells.
 pub fn storage<const D: usize>(cells: [f64; D], ratio: f64) -> f64 {
     // larger boxes need no exact number, and have none
     if cells.iter().product::<f64>() < 1e12 && ratio < 1e3 {

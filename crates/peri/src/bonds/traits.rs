@@ -64,7 +64,8 @@ pub trait BodyGeometry<const D: usize>: Send + Sync {
     fn whole_family(&self) -> Option<u32> {
         None
     }
-    /// Whether a family is whole and no bond of the body has a weight of its own: such families are alike in all sums over them.
+    /// Whether a family is whole and no bond of the body has a weight of its own: such families are alike in
+    /// all sums over them.
     fn has_whole_family(&self, site: usize) -> bool {
         let _ = site;
         false
@@ -73,7 +74,8 @@ pub trait BodyGeometry<const D: usize>: Send + Sync {
     fn relief(&self) -> Option<&Field<D>> {
         None
     }
-    /// The sites of a bond that only the first of them has; `None` where every family is symmetric, as it must be.
+    /// The sites of a bond that only the first of them has; `None` where every family is symmetric, as it
+    /// must be.
     fn one_sided(&self) -> Option<[usize; 2]> {
         self.particles().par_iter().find_map_first(|&site| {
             let mut lone = None;
@@ -93,17 +95,19 @@ pub trait BondForces<const D: usize>: BodyGeometry<D> {
     fn set_law(&mut self, fit: &KernelFit, modulus: f64);
     /// Sets per-particle surface-correction factors (one field of `D` components over the sites).
     fn set_factors(&mut self, factors: Field<D>);
-    /// Sets θ of solids of the mean deformation of a family, see [`crate::material::relief`]: before any bond breaks. Lattices have none.
+    /// Sets θ of solids of the mean deformation of a family, see [`crate::material::relief`]: before any bond
+    /// breaks. Lattices have none.
     fn set_relief(&mut self, relief: Field<D>) {
         let _ = relief;
     }
-    /// Copies a displacement before [`Self::force`] of it, where that reads a copy: in mixed precision ([`LatticeBonds::set_mixed`]), and
-    /// in clouds, where forces without a copy take longer. From the first call on, both give the forces of the displacement last copied.
+    /// Copies a displacement before [`Self::force`] of it, where that reads a copy: in mixed precision
+    /// ([`LatticeBonds::set_mixed`]), and in clouds, where forces without a copy take longer. From the first
+    /// call on, both give the forces of the displacement last copied.
     fn prepare(&mut self, displacement: &Field<D>) {
         let _ = displacement;
     }
-    /// Force densities Σ_J f V_J, N/m³, of whole [`Self::piece`]s from the site `start` on; collects the stretches observed if
-    /// asked, of every bond in at least one of the work items that hold its ends.
+    /// Force densities Σ_J f V_J, N/m³, of whole [`Self::piece`]s from the site `start` on; collects the
+    /// stretches observed if asked, of every bond in at least one of the work items that hold its ends.
     fn force(
         &self,
         displacement: &Field<D>,
@@ -111,23 +115,24 @@ pub trait BondForces<const D: usize>: BodyGeometry<D> {
         force: &mut [&mut [f64]; D],
         track: Option<&mut StretchRange>,
     );
-    /// Sites that [`Self::force`] may begin with: multiples of this, of which a work item is one. The bits of a force may depend on which
-    /// bonds the other sites of its piece have, and on no others.
+    /// Sites that [`Self::force`] may begin with: multiples of this, of which a work item is one. The bits of
+    /// a force may depend on which bonds the other sites of its piece have, and on no others.
     fn piece(&self) -> usize {
         CHUNK
     }
-    /// Extremes of e = λ² − 1 over bonds with an end in work item `chunk`; those of all items together are those of the body.
+    /// Extremes of e = λ² − 1 over bonds with an end in work item `chunk`; those of all items together are
+    /// those of the body.
     fn stretches(&self, displacement: &Field<D>, chunk: usize) -> StretchRange;
-    /// The intact bonds with e > `least`, up to rounding, by site and [`Neighbour::index`]; for all sites together each once from both
-    /// of its ends: what some sites add, whole pieces of one work item.
+    /// The intact bonds with e > `least`, up to rounding, by site and [`Neighbour::index`]; for all sites
+    /// together each once from both of its ends: what some sites add, whole pieces of one work item.
     fn suspects(&self, displacement: &Field<D>, sites: Range<usize>, least: f64) -> Vec<[u32; 2]>;
     /// Σ_I V_I Σ_J w V_J |ξ| φ(e) over the body; `None` where bonds are to be visited one by one.
     fn energy_sum(&self, displacement: &Field<D>, table: &EnergyTable) -> Option<f64> {
         let _ = (displacement, table);
         None
     }
-    /// Σ_J (2 w V_J/|ξ|)·max(table(e), least)·(1 + max_{d≠e} |n_d n_e|) of each site of a work item, n the direction of the
-    /// deformed bond; `None` as [`Self::energy_sum`].
+    /// Σ_J (2 w V_J/|ξ|)·max(table(e), least)·(1 + max_{d≠e} |n_d n_e|) of each site of a work item, n the
+    /// direction of the deformed bond; `None` as [`Self::energy_sum`].
     fn stiffness_sums(
         &self,
         displacement: &Field<D>,
@@ -138,7 +143,8 @@ pub trait BondForces<const D: usize>: BodyGeometry<D> {
         let _ = (displacement, chunk, table, least);
         None
     }
-    /// Σ share ξ⊗ξ/|ξ|² and Σ share η⊗ξ/|ξ|² over the intact bonds of each site of a work item; `None` as [`Self::energy_sum`].
+    /// Σ share ξ⊗ξ/|ξ|² and Σ share η⊗ξ/|ξ|² over the intact bonds of each site of a work item; `None` as
+    /// [`Self::energy_sum`].
     fn gradient_sums(&self, displacement: &Field<D>, chunk: usize) -> Option<Vec<GradientSums<D>>> {
         let _ = (displacement, chunk);
         None
@@ -151,8 +157,8 @@ pub trait BondDamage<const D: usize>: BodyGeometry<D> {
     fn sever(&mut self, bonds: &[Overstretched]);
     /// Damaged bonds (integrity below 1).
     fn softening(&self) -> &Softening;
-    /// Takes these to be the softened bonds, each named from both of its ends: [`BodyGeometry::neighbours`] weighs them by their
-    /// integrity, [`BondForces::force`] does not.
+    /// Takes these to be the softened bonds, each named from both of its ends: [`BodyGeometry::neighbours`]
+    /// weighs them by their integrity, [`BondForces::force`] does not.
     fn soften(&mut self, bonds: Vec<Softened>);
     /// Which bonds are intact, for checkpoints: as many words as [`Self::restore`] takes.
     fn intact(&self) -> Vec<u64>;

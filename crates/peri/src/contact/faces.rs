@@ -1,12 +1,14 @@
 //! Faces of a body: points of its true surface that share out a force among the particles below them.
 //!
 //! A face f at X_f with the outward normal N_f has the area A_f = Σ_I ψ_f(I) h_I·N_f and the weights
-//! w_fI = ψ_f(I) h_I·N_f/A_f, with the area vectors h_I of [`crate::material::surface_load`] and hat functions ψ_f of the
-//! distance along the surface, Σ_f ψ_f = 1. A uniform pressure on all faces then balances a uniform stress.
+//! w_fI = ψ_f(I) h_I·N_f/A_f, with the area vectors h_I of [`crate::material::surface_load`] and hat
+//! functions ψ_f of the distance along the surface, Σ_f ψ_f = 1. A uniform pressure on all faces then
+//! balances a uniform stress.
 //!
-//! A face touches a plane as a sphere of the radius r_f about Σ_I w_fI x_I, with r_f = N_f·(X_f − Σ_I w_fI X_I); on a flat face of a lattice
-//! r_f = 0. On a staircase, where Σ_I w_fI X_I lies beside X_f as well, the weights gain a term, linear across N_f, that brings it below
-//! X_f. No place depends on a rotation, so that forces have an energy and conserve momentum and angular momentum.
+//! A face touches a plane as a sphere of the radius r_f about Σ_I w_fI x_I, with r_f = N_f·(X_f − Σ_I w_fI
+//! X_I); on a flat face of a lattice r_f = 0. On a staircase, where Σ_I w_fI X_I lies beside X_f as well, the
+//! weights gain a term, linear across N_f, that brings it below X_f. No place depends on a rotation, so that
+//! forces have an energy and conserve momentum and angular momentum.
 
 use crate::bonds::{BodyGeometry, Bonds, CellGrid};
 use crate::field::Field;
@@ -18,10 +20,12 @@ use rayon::prelude::*;
 /// Half-width of the hat functions, and depth of the particles below a face, in spacings and horizons.
 const HAT: f64 = 1.0;
 const DEPTH: f64 = 2.16;
-/// Part of the area of a particle below which a face joins a neighbour, and distance of that neighbour in spacings.
+/// Part of the area of a particle below which a face joins a neighbour, and distance of that neighbour in
+/// spacings.
 const SMALL: f64 = 0.5;
 const JOINED: f64 = 2.1;
-/// Least variance of the particles along a direction, in squared spacings, for which weights gain a linear term.
+/// Least variance of the particles along a direction, in squared spacings, for which weights gain a linear
+/// term.
 const FLAT: f64 = 1e-3;
 /// Particles of a work item.
 const BATCH: usize = 1024;
@@ -62,7 +66,8 @@ impl<const D: usize> Faces<D> {
     /// Faces of a body; none where the surface has none. Faces whose area bonds of a crack or of
     /// another side take away are left out.
     ///
-    /// `tied` faces have r_f = 0: the weights gain a term along the normal as well, so that faces turn with the body.
+    /// `tied` faces have r_f = 0: the weights gain a term along the normal as well, so that faces turn with
+    /// the body.
     pub fn new(bonds: &dyn Bonds<D>, surface: &Surface<D>, tied: bool) -> Self {
         let area = typical_area(bonds);
         let load = surface_load(bonds, Tensor::<D>::identity());
@@ -186,8 +191,9 @@ impl<const D: usize> Faces<D> {
         greatest.map_or(0, |(site, _)| site)
     }
 
-    /// max_f Σ_g √(A_f A_g)|Σ_I w_fI w_gI/V_I|, m⁻¹: that times the stiffness of a plane over its area, Pa/m, bounds the greatest
-    /// eigenvalue that faces in touch add to the stiffness over volumes, N/m⁴ (Gershgorin over faces).
+    /// max_f Σ_g √(A_f A_g)|Σ_I w_fI w_gI/V_I|, m⁻¹: that times the stiffness of a plane over its area, Pa/m,
+    /// bounds the greatest eigenvalue that faces in touch add to the stiffness over volumes, N/m⁴ (Gershgorin
+    /// over faces).
     pub fn greatest(&self, bonds: &dyn BodyGeometry<D>) -> f64 {
         let row = |face: usize| {
             let mut products: Vec<(u32, f64)> = Vec::new();
@@ -232,7 +238,8 @@ pub fn typical_area<const D: usize>(bonds: &dyn BodyGeometry<D>) -> f64 {
     volumes / bonds.particles().len().max(1) as f64 / bonds.spacing()
 }
 
-/// All particles below faces, each nearer to its face than to an opposite one; hats add up to 1 over the faces of a patch.
+/// All particles below faces, each nearer to its face than to an opposite one; hats add up to 1 over the
+/// faces of a patch.
 fn below<const D: usize>(bonds: &dyn BodyGeometry<D>, surface: &Surface<D>) -> Vec<Below> {
     let (faces, spacing) = (surface.faces(), bonds.spacing());
     if faces.is_empty() {
@@ -313,7 +320,8 @@ fn join_small<const D: usize>(
     below.iter_mut().for_each(|below| below.face = target[below.face as usize]);
 }
 
-/// Adds to weights the term, linear across the normal of the face, with which Σ w X lies below it; how far below, m.
+/// Adds to weights the term, linear across the normal of the face, with which Σ w X lies below it; how far
+/// below, m.
 fn centre<const D: usize>(
     bonds: &dyn BodyGeometry<D>,
     face: &Face<D>,

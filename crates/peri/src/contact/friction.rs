@@ -29,8 +29,8 @@ impl<const D: usize> Contact<D> {
         self.start = None;
     }
 
-    /// Friction of all that touches at a displacement, sorted by pair: the slips of `old` go on with the normal forces there. What has
-    /// begun to touch since `start` slips for the rest of its way only.
+    /// Friction of all that touches at a displacement, sorted by pair: the slips of `old` go on with the
+    /// normal forces there. What has begun to touch since `start` slips for the rest of its way only.
     pub fn grips(
         &self,
         bonds: &dyn BodyGeometry<D>,
@@ -72,8 +72,8 @@ impl<const D: usize> Contact<D> {
         grips
     }
 
-    /// Friction after a load step, sorted by pair, for the next one; energy dissipated in the step, J, and force of friction of each
-    /// plane, N.
+    /// Friction after a load step, sorted by pair, for the next one; energy dissipated in the step, J, and
+    /// force of friction of each plane, N.
     pub fn slide(&self, displacement: &Field<D>) -> (Vec<Grip>, f64, Vec<[f64; 3]>) {
         let mut forces = vec![[0.0; 3]; self.planes().count()];
         let (mut dissipated, mut grips) = (0.0, self.held.clone());
@@ -114,7 +114,8 @@ impl<const D: usize> Contact<D> {
         self.held.iter().map(of).sum()
     }
 
-    /// Adds the force densities of friction between particles, N/m³, on the sites from `start` on, of one work item.
+    /// Adds the force densities of friction between particles, N/m³, on the sites from `start` on, of one
+    /// work item.
     pub(super) fn hold_pairs(&self, displacement: &Field<D>, start: usize, force: &mut [&mut [f64]; D]) {
         if self.start.is_none() {
             return;
@@ -137,8 +138,8 @@ impl<const D: usize> Contact<D> {
         &self.held[before(sites.start)..before(sites.end)]
     }
 
-    /// Friction after a step of explicit dynamics, s, with the velocity at the half step, m/s: the slips of `old` go on with the
-    /// present normal forces. Takes effect in [`Self::add_friction`].
+    /// Friction after a step of explicit dynamics, s, with the velocity at the half step, m/s: the slips of
+    /// `old` go on with the present normal forces. Takes effect in [`Self::add_friction`].
     pub fn slide_on(
         &mut self,
         bonds: &dyn BodyGeometry<D>,
@@ -186,7 +187,8 @@ impl<const D: usize> Contact<D> {
         self.start = None;
     }
 
-    /// Adds the force densities of friction after [`Self::slide_on`], N/m³, on the particles of work item `chunk`.
+    /// Adds the force densities of friction after [`Self::slide_on`], N/m³, on the particles of work item
+    /// `chunk`.
     pub fn add_friction(&self, chunk: usize, force: &mut [&mut [f64]; D]) {
         let start = chunk * CHUNK;
         for grip in self.held_by(start..start + force[0].len()) {

@@ -1,8 +1,9 @@
-//! Coulomb friction with elastic slip: return mapping of Simo & Laursen (1992), doi:10.1016/0045-7949(92)90540-G.
+//! Coulomb friction with elastic slip: return mapping of Simo & Laursen (1992),
+//! doi:10.1016/0045-7949(92)90540-G.
 //!
-//! Two sides in touch hold each other by T = −k_t e with the elastic slip e, up to |T| = b = μN; what goes beyond slides. For a given N
-//! the force is the gradient of the convex potential ½k_t|e*|² below b/k_t and b|e*| − b²/(2k_t) beyond, e* = Pe + Δu_t: equilibria
-//! exist, and methods that seek a minimum find them.
+//! Two sides in touch hold each other by T = −k_t e with the elastic slip e, up to |T| = b = μN; what goes
+//! beyond slides. For a given N the force is the gradient of the convex potential ½k_t|e*|² below b/k_t and
+//! b|e*| − b²/(2k_t) beyond, e* = Pe + Δu_t: equilibria exist, and methods that seek a minimum find them.
 
 use crate::geometry::length;
 use serde::{Deserialize, Serialize};
@@ -68,7 +69,8 @@ impl Grip {
         }
     }
 
-    /// Turns the slip into the plane across a new normal at its length, and shortens it to what the bound holds.
+    /// Turns the slip into the plane across a new normal at its length, and shortens it to what the bound
+    /// holds.
     pub fn fit(&mut self) {
         let old = length(self.slip);
         let turned = across(&self.normal, self.slip);

@@ -49,7 +49,8 @@ pub struct Listed {
     pub alone: bool,
 }
 
-/// A particle near another, seen from there. Lists are long and most of their pairs apart: it holds no more than shows that.
+/// A particle near another, seen from there. Lists are long and most of their pairs apart: it holds no more
+/// than shows that.
 #[derive(Clone, Copy)]
 struct Candidate<const D: usize> {
     site: u32,
@@ -135,8 +136,8 @@ impl<const D: usize> List<D> {
         }
     }
 
-    /// Takes in the pairs of sites whose bonds have just broken, each from both of its ends: the list is then that which would
-    /// have been made of the bonds that are left.
+    /// Takes in the pairs of sites whose bonds have just broken, each from both of its ends: the list is then
+    /// that which would have been made of the bonds that are left.
     pub fn part(&mut self, bonds: &dyn BodyGeometry<D>, pairs: &[[u32; 2]]) {
         // else the next update makes it anew
         let Some(vicinity) = &self.vicinity else { return };
@@ -277,7 +278,8 @@ impl<const D: usize> List<D> {
         Candidate { site: near.site, bond: near.bond.map(|x| (x / self.spacing) as f32) }
     }
 
-    /// The particles of `sites` that others are near to, each with those at r < d + `gap`, up to the gap of the list.
+    /// The particles of `sites` that others are near to, each with those at r < d + `gap`, up to the gap of
+    /// the list.
     pub fn pairs<'a>(
         &'a self,
         bonds: &'a dyn BodyGeometry<D>,
@@ -302,7 +304,8 @@ impl<const D: usize> List<D> {
                     reference += bond * bond;
                     square += zeta * zeta;
                 }
-                // most are farther apart by much more than rounding of ξ to single precision, which costs no root to see
+                // most are farther apart by much more than rounding of ξ to single precision, which costs no
+                // root to see
                 let closest = (OF_REFERENCE * OF_REFERENCE * reference).min(most * most);
                 if square
                     > 2.0 * gap * gap + (1.0 + f64::from(gap > 0.0) + ROUNDED) * closest + ROUNDED * reference

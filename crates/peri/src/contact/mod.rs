@@ -1,28 +1,32 @@
 //! Contact: repulsion of particles that no intact bond joins, rigid planes, friction.
 //!
-//! Two particles at the distance r = |ζ| < d repel each other along ζ = ξ + η with the force density pair k(d − r) and
-//! d = min(0.9|ξ|, 1.35(r_I + r_J)), radius r = ½(V/thickness)^(1/D), half the distance of neighbours on a lattice. 0.9|ξ| makes
-//! the reference state free of contact, and a bond that breaks in tension leaves no force behind; 1.35·2r exceeds the
-//! distance of neighbours, so that no particle slips between two. The stiffness is
+//! Two particles at the distance r = |ζ| < d repel each other along ζ = ξ + η with the force density pair k(d
+//! − r) and d = min(0.9|ξ|, 1.35(r_I + r_J)), radius r = ½(V/thickness)^(1/D), half the distance of
+//! neighbours on a lattice. 0.9|ξ| makes the reference state free of contact, and a bond that breaks in
+//! tension leaves no force behind; 1.35·2r exceeds the distance of neighbours, so that no particle slips
+//! between two. The stiffness is
 //!
-//! - k = ½s M_IJ/(Δx²V̄), M_IJ = 2M_I M_J/(M_I + M_J), of [`Contact::new`], with the longitudinal modulus M and the mean volume V̄: an
-//!   interface is as compliant as 2/s layers of confined material;
-//! - k = κ(c/δ), c = 6kθ, of [`Contact::short_range`]: the bond constant of the linear bond as a dual force. κ = 15 is that of Macek &
-//!   Silling (2007), doi:10.1016/j.finel.2007.08.012 (their c_s = 15c), and Parks et al. (2008), doi:10.1016/j.cpc.2008.06.011.
+//! - k = ½s M_IJ/(Δx²V̄), M_IJ = 2M_I M_J/(M_I + M_J), of [`Contact::new`], with the longitudinal modulus M
+//!   and the mean volume V̄: an interface is as compliant as 2/s layers of confined material;
+//! - k = κ(c/δ), c = 6kθ, of [`Contact::short_range`]: the bond constant of the linear bond as a dual force.
+//!   κ = 15 is that of Macek & Silling (2007), doi:10.1016/j.finel.2007.08.012 (their c_s = 15c), and Parks
+//!   et al. (2008), doi:10.1016/j.cpc.2008.06.011.
 //!
-//! Intact bonds do not repel otherwise: their own law resists compression. Particles have their whole volume, whatever the
-//! corrections of bonds.
+//! Intact bonds do not repel otherwise: their own law resists compression. Particles have their whole volume,
+//! whatever the corrections of bonds.
 //!
-//! The pairs come from a list of all that are within d, a gap, and a skin, rebuilt where particles near each other have
-//! moved against each other by the skin; where a bond breaks its pair is added. Pairs beyond d add nothing, not even a
-//! rounding: the list is no part of the state, and how often it is made makes no difference to any bit.
+//! The pairs come from a list of all that are within d, a gap, and a skin, rebuilt where particles near each
+//! other have moved against each other by the skin; where a bond breaks its pair is added. Pairs beyond d add
+//! nothing, not even a rounding: the list is no part of the state, and how often it is made makes no
+//! difference to any bit.
 //!
-//! Limits. Contact of particles knows distances only: a particle that leaps past another in one step stays there. Force and energy
-//! are finite in full overlap (r = 0: kd along the reference ξ; energy ½kd² V_I V_J), so that loads beyond that press particles
-//! through each other.
+//! Limits. Contact of particles knows distances only: a particle that leaps past another in one step stays
+//! there. Force and energy are finite in full overlap (r = 0: kd along the reference ξ; energy ½kd² V_I V_J),
+//! so that loads beyond that press particles through each other.
 //!
-//! Planes act on faces, see `faces`. Friction is Coulomb's with an elastic slip, see `grip`: of pairs equal and opposite, but not along
-//! the pair: particles have no spin, so that it does not conserve angular momentum.
+//! Planes act on faces, see `faces`. Friction is Coulomb's with an elastic slip, see `grip`: of pairs equal
+//! and opposite, but not along the pair: particles have no spin, so that it does not conserve angular
+//! momentum.
 
 mod faces;
 mod friction;
@@ -103,8 +107,8 @@ fn non_negative(name: &'static str, found: f64) -> Result<(), Error> {
 }
 
 impl<const D: usize> Contact<D> {
-    /// Contact of a body of the longitudinal modulus M = `modulus`, Pa, with the stiffness s = `stiffness`, see [`PAIR_STIFFNESS`]. s = 0
-    /// repels nothing: overlaps are looked at only.
+    /// Contact of a body of the longitudinal modulus M = `modulus`, Pa, with the stiffness s = `stiffness`,
+    /// see [`PAIR_STIFFNESS`]. s = 0 repels nothing: overlaps are looked at only.
     ///
     /// # Errors
     /// [`Error::Parameter`] where s is negative, M is not positive, or either is not finite.
@@ -126,7 +130,8 @@ impl<const D: usize> Contact<D> {
         Ok(Self { moduli, layered: true, ..Self::of_pairs(bonds, unit, stiffness)? })
     }
 
-    /// Contact of a body with the bond modulus `modulus` = kθ, N/m⁶, and κ = `stiffness`, see [`SHORT_RANGE`].
+    /// Contact of a body with the bond modulus `modulus` = kθ, N/m⁶, and κ = `stiffness`, see
+    /// [`SHORT_RANGE`].
     ///
     /// # Errors
     /// [`Error::Parameter`] where κ is negative, kθ is not positive, or either is not finite.
@@ -159,11 +164,12 @@ impl<const D: usize> Contact<D> {
         })
     }
 
-    /// With rigid planes beside the faces of `surface`, of a body of the longitudinal modulus M = `modulus`, Pa.
+    /// With rigid planes beside the faces of `surface`, of a body of the longitudinal modulus M = `modulus`,
+    /// Pa.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a normal without direction, and for what is not finite or negative; [`Error::Geometry`] for a
-    /// bonded plane that touches nothing.
+    /// [`Error::Parameter`] for a normal without direction, and for what is not finite or negative;
+    /// [`Error::Geometry`] for a bonded plane that touches nothing.
     pub fn with_planes(
         mut self,
         bonds: &dyn Bonds<D>,
@@ -180,8 +186,9 @@ impl<const D: usize> Contact<D> {
         Ok(self)
     }
 
-    /// With held particles tied to the others at their interface with the stiffness s = `stiffness`, of a body of the outer surface `outside`
-    /// and the longitudinal modulus M = `modulus`, Pa, without bonds [`across`] the interface.
+    /// With held particles tied to the others at their interface with the stiffness s = `stiffness`, of a
+    /// body of the outer surface `outside` and the longitudinal modulus M = `modulus`, Pa, without bonds
+    /// [`across`] the interface.
     ///
     /// # Errors
     /// [`Error::Parameter`] where s is negative, M is not positive, or either is not finite.
@@ -200,11 +207,12 @@ impl<const D: usize> Contact<D> {
         Ok(self)
     }
 
-    /// With friction of the coefficient `friction` between particles; `elastic_slip` is the slip γ, m, at which it is Coulomb's,
-    /// `None` that at which tangential and normal stiffness are equal.
+    /// With friction of the coefficient `friction` between particles; `elastic_slip` is the slip γ, m, at
+    /// which it is Coulomb's, `None` that at which tangential and normal stiffness are equal.
     ///
     /// # Errors
-    /// [`Error::Parameter`] where the coefficient is negative, the slip is not positive, or either is not finite.
+    /// [`Error::Parameter`] where the coefficient is negative, the slip is not positive, or either is not
+    /// finite.
     pub fn with_friction(mut self, friction: f64, elastic_slip: Option<f64>) -> Result<Self, Error> {
         non_negative("contact.friction", friction)?;
         if let Some(slip) = elastic_slip {
@@ -214,8 +222,8 @@ impl<const D: usize> Contact<D> {
         Ok(self)
     }
 
-    /// With another skin, in m: a thin one is filled often, a thick one holds many pairs in vain. The list is made at the
-    /// next update. Values that are not positive count as 0: made at every update.
+    /// With another skin, in m: a thin one is filled often, a thick one holds many pairs in vain. The list is
+    /// made at the next update. Values that are not positive count as 0: made at every update.
     pub fn with_skin(mut self, skin: f64) -> Self {
         self.list.set_skin(skin);
         self
@@ -264,7 +272,8 @@ impl<const D: usize> Contact<D> {
         self.planes.iter().flat_map(Planes::moved)
     }
 
-    /// Deepest overlap of a plane that has moved, m, before its last move and after it; −∞ where none touches.
+    /// Deepest overlap of a plane that has moved, m, before its last move and after it; −∞ where none
+    /// touches.
     pub fn approach(&self, displacement: &Field<D>) -> [f64; 2] {
         self.planes.as_ref().map_or([f64::NEG_INFINITY; 2], |planes| planes.approach(displacement))
     }
@@ -293,8 +302,8 @@ impl<const D: usize> Contact<D> {
         self.list.rebuilds
     }
 
-    /// Prepares the forces of a displacement: rebuilds the list where particles near each other may have moved against each other by the
-    /// skin since it was made, and computes the forces of planes.
+    /// Prepares the forces of a displacement: rebuilds the list where particles near each other may have
+    /// moved against each other by the skin since it was made, and computes the forces of planes.
     pub fn update(&mut self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) {
         if self.has_pairs() {
             self.list.update(bonds, displacement);
@@ -317,7 +326,8 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Makes the list for a displacement; to be called where bonds have changed, otherwise than by [`Self::part`].
+    /// Makes the list for a displacement; to be called where bonds have changed, otherwise than by
+    /// [`Self::part`].
     pub fn rebuild(&mut self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) {
         self.list.rebuild(bonds, displacement);
         if let Some(planes) = &mut self.planes {
@@ -332,7 +342,8 @@ impl<const D: usize> Contact<D> {
         self.stiffness * 2.0 * a * b / (a + b)
     }
 
-    /// Of `sites`, the particles with those at r < d + `gap` from them; none where particles do not repel each other.
+    /// Of `sites`, the particles with those at r < d + `gap` from them; none where particles do not repel
+    /// each other.
     fn pairs<'a>(
         &'a self,
         bonds: &'a dyn BodyGeometry<D>,
@@ -343,7 +354,8 @@ impl<const D: usize> Contact<D> {
         self.has_pairs().then(|| self.list.pairs(bonds, displacement, sites, gap)).into_iter().flatten()
     }
 
-    /// Adds the force densities of pairs, −Σ_J k(d − r) V_J ζ/r, of planes, and of friction between equilibria, N/m³, on the particles from the site `start` on, of one work item.
+    /// Adds the force densities of pairs, −Σ_J k(d − r) V_J ζ/r, of planes, and of friction between
+    /// equilibria, N/m³, on the particles from the site `start` on, of one work item.
     pub fn force(
         &self,
         bonds: &dyn BodyGeometry<D>,

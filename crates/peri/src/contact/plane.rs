@@ -5,8 +5,9 @@ use crate::error::Error;
 use crate::geometry::length;
 use serde::{Deserialize, Serialize};
 
-/// A rigid half-space behind a plane. A face of the body at the depth o below it is pushed out with the pressure s(M/Δx)o, with the
-/// longitudinal modulus M and the spacing Δx: s layers of confined material are as stiff as the contact.
+/// A rigid half-space behind a plane. A face of the body at the depth o below it is pushed out with the
+/// pressure s(M/Δx)o, with the longitudinal modulus M and the spacing Δx: s layers of confined material are
+/// as stiff as the contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane<const D: usize> {
     /// A point of the plane, m.
@@ -84,8 +85,8 @@ pub struct PlaneReaction {
     pub force: [f64; 3],
     /// Area of the faces in touch, m².
     pub area: f64,
-    /// Root of the mean square distance from the centre of pressure, weighted with the pressure, m. A Hertzian strip of
-    /// half-width b has b/2.
+    /// Root of the mean square distance from the centre of pressure, weighted with the pressure, m. A
+    /// Hertzian strip of half-width b has b/2.
     pub spread: f64,
     /// Least gap, m, negative for an overlap.
     pub gap: f64,

@@ -42,8 +42,9 @@ impl<const D: usize> Planes<D> {
         }
     }
 
-    /// Friction of all that touches at a displacement, with the normal forces there; the slips of `old`, sorted by pair, go on. What has begun to touch
-    /// since `start` has slipped for its part of the way alone.
+    /// Friction of all that touches at a displacement, with the normal forces there; the slips of `old`,
+    /// sorted by pair, go on. What has begun to touch since `start` has slipped for its part of the way
+    /// alone.
     pub fn grips(&self, field: &Field<D>, start: &Field<D>, old: &[Grip]) -> Vec<Grip> {
         let mut grips = Vec::new();
         for (number, placed) in self.each.iter().enumerate() {

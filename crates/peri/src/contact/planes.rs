@@ -74,11 +74,13 @@ pub struct Planes<const D: usize> {
     /// M/Δx, Pa/m.
     penalty: Property,
     spacing: f64,
-    /// Forces of all planes on faces and on bare particles, N, at the displacement of the last update; empty where nothing touches.
+    /// Forces of all planes on faces and on bare particles, N, at the displacement of the last update; empty
+    /// where nothing touches.
     pushes: Vec<[f64; D]>,
     /// Forces of friction in explicit dynamics likewise.
     pub(super) drags: Vec<[f64; D]>,
-    /// Bound of the eigenvalues that touching faces add to the stiffness over volumes for a penalty of 1 Pa/m.
+    /// Bound of the eigenvalues that touching faces add to the stiffness over volumes for a penalty of 1
+    /// Pa/m.
     greatest: f64,
 }
 
@@ -158,7 +160,8 @@ impl<const D: usize> Planes<D> {
         self.each.iter().map(|placed| std::array::from_fn(|d| placed.now[d] - placed.before[d]))
     }
 
-    /// Takes in the particles among `sites` that have lost bonds: they touch planes themselves, and faces above them no longer do.
+    /// Takes in the particles among `sites` that have lost bonds: they touch planes themselves, and faces
+    /// above them no longer do.
     pub fn lose(&mut self, bonds: &dyn BodyGeometry<D>, sites: impl Iterator<Item = usize>) {
         let before = self.bare.len();
         for site in sites.filter(|&site| bonds.bonded(site) < self.bonded[site]) {
@@ -251,7 +254,8 @@ impl<const D: usize> Planes<D> {
         (0..count.div_ceil(BATCH)).into_par_iter().map(batch).collect::<Vec<_>>().concat()
     }
 
-    /// Computes the forces of all planes at a displacement, with those of friction for the motion since `start`.
+    /// Computes the forces of all planes at a displacement, with those of friction for the motion since
+    /// `start`.
     pub fn update(&mut self, field: &Field<D>, held: &[Grip], start: Option<&Field<D>>) {
         let mut pushes = std::mem::take(&mut self.pushes);
         pushes.clear();
@@ -361,7 +365,8 @@ impl<const D: usize> Planes<D> {
                 (0..D).for_each(|d| (low[d], high[d]) = (low[d].min(across[d]), high[d].max(across[d])));
                 count += 1.0;
             }
-            // a face stands for half of what lies between two, on either side; in space there are as many in each row
+            // a face stands for half of what lies between two, on either side; in space there are as many in
+            // each row
             let rows: f64 = if D == 2 { count } else { count.sqrt() };
             let spans: [f64; D] = std::array::from_fn(|d| (high[d] - low[d]).max(0.0));
             let extent = if D == 2 { length(spans) } else { spans.into_iter().fold(0.0, f64::max) };
@@ -408,8 +413,8 @@ impl<const D: usize> Planes<D> {
         matrix.symmetric_eigenvalues().max() * self.penalty.greatest() * self.greatest
     }
 
-    /// Visits what touches or is nearer than `gap`, m: the particles below it with their weights, the directions in which the plane
-    /// holds it, and the stiffness, N/m.
+    /// Visits what touches or is nearer than `gap`, m: the particles below it with their weights, the
+    /// directions in which the plane holds it, and the stiffness, N/m.
     pub fn springs(&self, field: &Field<D>, gap: f64, visit: &mut super::Spring<D>) {
         let mut below = Vec::new();
         for placed in &self.each {

@@ -1,8 +1,9 @@
 //! Grips tied at their surface: no bond leads from held particles to others, whose faces follow them instead.
 //!
-//! A region of prescribed displacement that holds a body by its bonds gives way: families that reach across its surface see half of the
-//! strain on either side, as if the body were about one layer longer. A face of the free side at X_f, pulled by the traction s(M/Δx)(u_f − U(X_f)),
-//! with U extrapolated linearly from the two held particles behind it, has no such layer.
+//! A region of prescribed displacement that holds a body by its bonds gives way: families that reach across
+//! its surface see half of the strain on either side, as if the body were about one layer longer. A face of
+//! the free side at X_f, pulled by the traction s(M/Δx)(u_f − U(X_f)), with U extrapolated linearly from the
+//! two held particles behind it, has no such layer.
 
 use super::faces::Faces;
 use crate::bonds::{BodyGeometry, LatticeBonds, Overstretched};
@@ -24,7 +25,8 @@ pub fn across<const D: usize>(bonds: &dyn BodyGeometry<D>, held: &[bool]) -> Vec
     list
 }
 
-/// Particles of the regions that are held in all components and as large as a family, by site: what holds single particles holds no surface.
+/// Particles of the regions that are held in all components and as large as a family, by site: what holds
+/// single particles holds no surface.
 pub fn grips<const D: usize>(bonds: &LatticeBonds<D>, constrained: &[u8]) -> Vec<bool> {
     let all = (1_u8 << D) - 1;
     let is_held = |site: usize| constrained.get(site).is_some_and(|bits| *bits == all);
@@ -65,7 +67,8 @@ pub struct Ties<const D: usize> {
     greatest: f64,
 }
 
-/// Sides of free particles beside held ones, with the held particles that extrapolate to them, each with its factor.
+/// Sides of free particles beside held ones, with the held particles that extrapolate to them, each with its
+/// factor.
 pub struct Interface<const D: usize> {
     /// The sides, with normals towards the held particles.
     pub surface: Surface<D>,
@@ -102,8 +105,8 @@ impl<const D: usize> Interface<D> {
 }
 
 impl<const D: usize> Ties<D> {
-    /// Ties the sides of an interface to what is behind it, in a body with the outer surface `outside` and no bonds across the interface; the
-    /// penalty is sM/Δx, Pa/m.
+    /// Ties the sides of an interface to what is behind it, in a body with the outer surface `outside` and no
+    /// bonds across the interface; the penalty is sM/Δx, Pa/m.
     pub fn new(bonds: &LatticeBonds<D>, interface: Interface<D>, outside: &Surface<D>, penalty: f64) -> Self {
         let Interface { surface, behind } = interface;
         let mut faces = Faces::new(bonds, &surface.bounded_by(outside), true);

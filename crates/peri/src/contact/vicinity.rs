@@ -17,14 +17,15 @@ pub struct Vicinity<const D: usize> {
     skin: f64,
     /// Displacement at which the list was made.
     pub listed_at: Field<D>,
-    /// The last displacement at which cells were compared, and what any two particles may move against each other from there on, m.
+    /// The last displacement at which cells were compared, and what any two particles may move against each
+    /// other from there on, m.
     compared_at: Field<D>,
     left: f64,
 }
 
 impl<const D: usize> Vicinity<D> {
-    /// Of a list that holds all pairs which may touch until two particles have moved by `skin` against each other; pairs that do not share
-    /// a cell of the grid or neighbouring ones are `edge` or more apart.
+    /// Of a list that holds all pairs which may touch until two particles have moved by `skin` against each
+    /// other; pairs that do not share a cell of the grid or neighbouring ones are `edge` or more apart.
     pub fn new(grid: CellGrid<D>, displacement: &Field<D>, edge: f64, skin: f64) -> Self {
         let (listed_at, compared_at) = (displacement.clone(), displacement.clone());
         Self { grid, edge, skin, listed_at, compared_at, left: skin }
@@ -57,7 +58,8 @@ impl<const D: usize> Vicinity<D> {
         self.left > LEAST * self.skin
     }
 
-    /// What any two particles that the list lacks may still move against each other, m; below 0 where that was too much, or is not known.
+    /// What any two particles that the list lacks may still move against each other, m; below 0 where that
+    /// was too much, or is not known.
     fn compare(&self, particles: &[u32], displacement: &Field<D>) -> f64 {
         // least and greatest components of the moves in every cell
         let of = |members: &[u32]| {
@@ -80,8 +82,9 @@ impl<const D: usize> Vicinity<D> {
             let along = |d: usize| (a[1][d] - b[0][d]).max(b[1][d] - a[0][d]);
             (0..D).map(|d| along(d) * along(d)).sum::<f64>().sqrt()
         };
-        // pairs k ≥ 2 cells apart were at least (k − 1) edges apart, and an edge is no less than a contact distance, the gap of the list
-        // and the skin: they may move by (k − 2) edges and a skin against each other
+        // pairs k ≥ 2 cells apart were at least (k − 1) edges apart, and an edge is no less than a contact
+        // distance, the gap of the list and the skin: they may move by (k − 2) edges and a skin against each
+        // other
         let allowed = |rings: i64| (rings - 2).max(0) as f64 * self.edge + self.skin;
         let left = |number: usize| {
             let mut left = f64::INFINITY;

@@ -33,11 +33,12 @@ impl CrackArea {
         Self { short: crossing.short, words, pairs }
     }
 
-    /// Area of new cracks, m². Two particles up to 1.8 spacings apart are parted where their bond has broken and no particle is left that is
-    /// bonded to both: of a crack's tip that holds up to a horizon behind its foremost broken bond, of bonds that broke beside the crack
-    /// nowhere. By the formula of Cauchy and Crofton the area is Σ V_I V_J/|ξ| over these pairs, over ½ Σ_J V_J |ξ_e|/|ξ|: lines of all
-    /// directions meet a surface in proportion to its area. With 1/|ξ| planes along the axes, at 45° and along (111) count the same to 2 %
-    /// (cf. Boykov & Kolmogorov, ICCV 2003, doi:10.1109/ICCV.2003.1238310).
+    /// Area of new cracks, m². Two particles up to 1.8 spacings apart are parted where their bond has broken
+    /// and no particle is left that is bonded to both: of a crack's tip that holds up to a horizon behind its
+    /// foremost broken bond, of bonds that broke beside the crack nowhere. By the formula of Cauchy and
+    /// Crofton the area is Σ V_I V_J/|ξ| over these pairs, over ½ Σ_J V_J |ξ_e|/|ξ|: lines of all directions
+    /// meet a surface in proportion to its area. With 1/|ξ| planes along the axes, at 45° and along (111)
+    /// count the same to 2 % (cf. Boykov & Kolmogorov, ICCV 2003, doi:10.1109/ICCV.2003.1238310).
     pub fn of<const D: usize>(&self, bonds: &dyn Bonds<D>) -> f64 {
         let share = |site: usize, other: usize, length: f64| {
             let mut common = false;

@@ -10,15 +10,16 @@ use serde::Deserialize;
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Convention {
-    /// The tearing energy, at which a crack in equilibrium runs: that of the lattice's own bonds across a unit of crack at λ_c, and what
-    /// is lost when they snap and at the lattice's barriers. What tests measure.
+    /// The tearing energy, at which a crack in equilibrium runs: that of the lattice's own bonds across a
+    /// unit of crack at λ_c, and what is lost when they snap and at the lattice's barriers. What tests
+    /// measure.
     #[default]
     Tearing,
-    /// The continuum's energy of the bonds across a unit of crack at λ_c, G₀ of Silling & Askari, Comput. Struct. 83 (2005) 1526: for
-    /// comparison with published values of G₀ and s₀ and with other programs.
+    /// The continuum's energy of the bonds across a unit of crack at λ_c, G₀ of Silling & Askari, Comput.
+    /// Struct. 83 (2005) 1526: for comparison with published values of G₀ and s₀ and with other programs.
     Bonds,
-    /// The tearing energy of bonds that soften and break at no load: nothing is lost but what is in them, and a crack runs at the energy of the
-    /// lattice's bonds across it at every horizon ratio.
+    /// The tearing energy of bonds that soften and break at no load: nothing is lost but what is in them, and
+    /// a crack runs at the energy of the lattice's bonds across it at every horizon ratio.
     Softening,
 }
 
@@ -33,20 +34,23 @@ impl Convention {
     }
 }
 
-/// s of κ = 1 + sD/N in the plane and in space, from strips of pure shear at N = 12 to 196 and 32 to 256 (formulation-tearing.md, 1, 2).
+/// s of κ = 1 + sD/N in the plane and in space, from strips of pure shear at N = 12 to 196 and 32 to 256
+/// (formulation-tearing.md, 1, 2).
 const SNAP: [f64; 2] = [6.2, 8.0];
 /// Length up to which bonds are short, in spacings: along edges and diagonals of a lattice's cells.
 pub(super) const SHORT: f64 = 1.8;
-/// Part of the horizon by which the centroid of the bonds of a particle at a surface lies off it: 0.33 in the outermost layer of a plane
-/// body, 0.24 to 0.28 in space, 0 inside; jitter of 0.3 spacings moves it by 0.07.
+/// Part of the horizon by which the centroid of the bonds of a particle at a surface lies off it: 0.33 in the
+/// outermost layer of a plane body, 0.24 to 0.28 in space, 0 inside; jitter of 0.3 spacings moves it by 0.07.
 const OFF: f64 = 0.2;
 
 /// Bonds of a particle inside a body, across planes through it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crossing {
-    /// Σ_J w V_J |ξ_e||ξ|, m⁵, with the axis e of the largest sum: kθΦ times it is the energy of the bonds across a unit area.
+    /// Σ_J w V_J |ξ_e||ξ|, m⁵, with the axis e of the largest sum: kθΦ times it is the energy of the bonds
+    /// across a unit area.
     pub reach: f64,
-    /// Σ_J w V_J |ξ_e|/|ξ| over bonds up to `SHORT` spacings, m³, along the same axis: short bonds across a unit area, see [`super::CrackArea`].
+    /// Σ_J w V_J |ξ_e|/|ξ| over bonds up to `SHORT` spacings, m³, along the same axis: short bonds across a
+    /// unit area, see [`super::CrackArea`].
     pub short: f64,
     /// Bonds N of the particle.
     pub bonds: f64,
@@ -86,8 +90,8 @@ impl<const D: usize> Sums<D> {
 }
 
 impl Crossing {
-    /// Of one particle with a whole family on a lattice, of the mean over such particles in a cloud, before the bonds have factors of
-    /// their own; `surface` are those of the surface correction.
+    /// Of one particle with a whole family on a lattice, of the mean over such particles in a cloud, before
+    /// the bonds have factors of their own; `surface` are those of the surface correction.
     pub fn new<const D: usize>(bonds: &dyn BodyGeometry<D>, surface: Option<&Field<D>>) -> Self {
         let inner = match bonds.whole_family() {
             Some(all) => {

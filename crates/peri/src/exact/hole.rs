@@ -1,4 +1,5 @@
-//! Computed stresses around a hole at the origin of a plate under tension along x, compared with closed forms.
+//! Computed stresses around a hole at the origin of a plate under tension along x, compared with closed
+//! forms.
 
 use super::{Plate, kirsch};
 use crate::bonds::Bonds;

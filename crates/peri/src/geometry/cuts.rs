@@ -25,8 +25,8 @@ impl<const D: usize> Cut<D> {
         })
     }
 
-    /// Where the segment from `a` to `b` meets the closed cut, or passes it by no more than `slack` of its length; `None` where it does
-    /// not, lies along it or ends on it.
+    /// Where the segment from `a` to `b` meets the closed cut, or passes it by no more than `slack` of its
+    /// length; `None` where it does not, lies along it or ends on it.
     fn meets(&self, a: [f64; D], b: [f64; D], slack: f64) -> Option<Meeting<D>> {
         let solution = self.passage(a, b)?;
         let size = length(std::array::from_fn::<f64, D, _>(|d| b[d] - a[d]));
@@ -49,7 +49,8 @@ impl<const D: usize> Cut<D> {
         Some(meeting)
     }
 
-    /// Where the line from `a` to `b` passes its plane (in 2D its line): the part of the way, and of each of its edges.
+    /// Where the line from `a` to `b` passes its plane (in 2D its line): the part of the way, and of each of
+    /// its edges.
     pub fn passage(&self, a: [f64; D], b: [f64; D]) -> Option<[f64; D]> {
         let mut columns = [[0.0; D]; D];
         columns[0] = std::array::from_fn(|d| b[d] - a[d]);
@@ -117,8 +118,8 @@ pub fn cuts_within<const D: usize>(cuts: &[Cut<D>], point: [f64; D], reach: f64)
 /// Part of a bond's length within which it counts as touching a cut's rim, or as ending on a cut.
 const NEAR: f64 = 1e-9;
 
-/// Part of a bond's length by which two cuts may miss each other and still meet: of bonds as long as the spacing to the horizon a
-/// thousandth of the spacing, or so.
+/// Part of a bond's length by which two cuts may miss each other and still meet: of bonds as long as the
+/// spacing to the horizon a thousandth of the spacing, or so.
 const JOINED: f64 = 5e-4;
 
 /// ‖x‖.
@@ -143,12 +144,13 @@ struct Meeting<const D: usize> {
     inward: [f64; D],
 }
 
-/// Whether cuts break the bond of `a` and `b`: solves a + s(b − a) = corner + Σ wᵢ edgeᵢ and asks for 0 < s < 1, 0 < w < 1.
+/// Whether cuts break the bond of `a` and `b`: solves a + s(b − a) = corner + Σ wᵢ edgeᵢ and asks for 0 < s <
+/// 1, 0 < w < 1.
 ///
-/// The answer is one for the pair, whichever end comes first. A bond through a tip (in 3D: the rim) stays, however the
-/// tip is rounded, unless another cut continues from there on the bond's other side: cuts that miss each other by less than a
-/// thousandth of the spacing meet. A bond parallel to a cut, or that ends
-/// on it, stays.
+/// The answer is one for the pair, whichever end comes first. A bond through a tip (in 3D: the rim) stays,
+/// however the tip is rounded, unless another cut continues from there on the bond's other side: cuts that
+/// miss each other by less than a thousandth of the spacing meet. A bond parallel to a cut, or that ends on
+/// it, stays.
 pub fn severed<const D: usize>(cuts: &[Cut<D>], a: [f64; D], b: [f64; D]) -> bool {
     let (a, b) = if a <= b { (a, b) } else { (b, a) };
     let met: Vec<Meeting<D>> = cuts.iter().filter_map(|cut| cut.meets(a, b, JOINED)).collect();
@@ -174,8 +176,8 @@ pub fn severed<const D: usize>(cuts: &[Cut<D>], a: [f64; D], b: [f64; D]) -> boo
 mod tests {
     use super::*;
 
-    /// Two cuts that meet in a corner are one crack: what passes through the corner from one side to the other goes,
-    /// what only touches it stays.
+    /// Two cuts that meet in a corner are one crack: what passes through the corner from one side to the
+    /// other goes, what only touches it stays.
     #[test]
     fn cuts_that_meet_leave_no_gap() {
         let cut = |from: [f64; 2], to: [f64; 2]| Cut {

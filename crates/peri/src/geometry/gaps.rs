@@ -2,11 +2,11 @@
 //!
 //! A bond crosses a gap where its straight line
 //! * passes from one added shape to another that does not touch it, or
-//! * passes through the empty part of a box cut out (a disc: a flat cylinder) with its ends on opposite sides, or through a hole
-//!   narrower than the horizon.
+//! * passes through the empty part of a box cut out (a disc: a flat cylinder) with its ends on opposite
+//!   sides, or through a hole narrower than the horizon.
 //!
-//! Bonds around a re-entrant corner, and chords of wide holes, stay. Shapes touch where they overlap or share a part of a face; points and
-//! edges do not join them.
+//! Bonds around a re-entrant corner, and chords of wide holes, stay. Shapes touch where they overlap or share
+//! a part of a face; points and edges do not join them.
 
 use super::{Lattice, Operation, Shape, length};
 use crate::bonds::CellGrid;
@@ -61,7 +61,8 @@ impl<const D: usize> Gaps<D> {
         (narrow || parted).then_some(gaps)
     }
 
-    /// Those between the parts of a lattice: cells belong together that share a face, an edge or a corner. `None` where there is one part.
+    /// Those between the parts of a lattice: cells belong together that share a face, an edge or a corner.
+    /// `None` where there is one part.
     pub fn of_cells(lattice: &Lattice<D>) -> Option<Self> {
         let parts = connected(lattice);
         let several = parts.iter().any(|&part| part > 1);
@@ -70,8 +71,9 @@ impl<const D: usize> Gaps<D> {
         several.then_some(Self { horizon: f64::INFINITY, closed: CLOSED * spacing, kind })
     }
 
-    /// Those between the parts of a cloud: points belong together that are nearer than 1.5 edges of the larger of their cubes. `None`
-    /// where there is one part, or the parts have less than ten points in the mean: points then are far from cubes.
+    /// Those between the parts of a cloud: points belong together that are nearer than 1.5 edges of the
+    /// larger of their cubes. `None` where there is one part, or the parts have less than ten points in the
+    /// mean: points then are far from cubes.
     pub fn of_points(points: &[[f64; D]], volumes: &[f64], thickness: f64) -> Option<Self> {
         let edges: Vec<f64> = volumes.iter().map(|v| JOINED * (v / thickness).powf(1.0 / D as f64)).collect();
         let largest = edges.iter().copied().fold(0.0, f64::max);
@@ -221,7 +223,8 @@ impl<const D: usize> Near<'_, D> {
         leaves
     }
 
-    /// Visits the middles of the pieces into which shapes cut the way from `a` to `b`, less those that count as closed.
+    /// Visits the middles of the pieces into which shapes cut the way from `a` to `b`, less those that count
+    /// as closed.
     fn pieces(&self, a: [f64; D], b: [f64; D], mut visit: impl FnMut([f64; D])) {
         let Kind::Shapes { operations, .. } = &self.gaps.kind else { return };
         let mut ends = vec![0.0, 1.0];
@@ -266,7 +269,8 @@ impl<const D: usize> Shape<D> {
         (0..D).map(|d| high[d] - low[d]).fold(f64::INFINITY, f64::min)
     }
 
-    /// Whether it lies between two points as a slot between its flanks, or is a hole narrower than `horizon`, m.
+    /// Whether it lies between two points as a slot between its flanks, or is a hole narrower than `horizon`,
+    /// m.
     fn is_between(&self, a: [f64; D], b: [f64; D], horizon: f64) -> bool {
         let (low, high) = self.bounds();
         let beyond =

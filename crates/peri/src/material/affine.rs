@@ -10,13 +10,14 @@ use crate::calibrate::modulus_in;
 use crate::error::Error;
 use polycore::langevin;
 
-/// Chains of n links along the bonds of a family in space, which move with it (Treloar & Riding 1979, doi:10.1098/rspa.1979.0163):
-/// W = Σ ŵψ(λ) − ½ψ′(1)(M − 1/3):(FᵀF − 1) − ⅓ψ′(1) ln J + ¼κ(J² − 1 − 2 ln J), per intact part I of the family, with ŵ, M and F of
-/// [`super::Deformation`] and ψ = c n [xβ + ln(β/sinh β)], x = λ/√n, β = 𝓛⁻¹(x), ψ′ = c√n β.
+/// Chains of n links along the bonds of a family in space, which move with it (Treloar & Riding 1979,
+/// doi:10.1098/rspa.1979.0163): W = Σ ŵψ(λ) − ½ψ′(1)(M − 1/3):(FᵀF − 1) − ⅓ψ′(1) ln J + ¼κ(J² − 1 − 2 ln J),
+/// per intact part I of the family, with ŵ, M and F of [`super::Deformation`] and ψ = c n [xβ + ln(β/sinh
+/// β)], x = λ/√n, β = 𝓛⁻¹(x), ψ′ = c√n β.
 ///
-/// The second term takes off what the pre-tension of chains does in families that are not isotropic (edges, lattices). A homogeneous
-/// deformation is exact, rest has no force, and Poisson's ratio is free. Where too few bonds are left for a gradient, springs of the
-/// same shear modulus act as in [`super::NonlocalSolid`].
+/// The second term takes off what the pre-tension of chains does in families that are not isotropic (edges,
+/// lattices). A homogeneous deformation is exact, rest has no force, and Poisson's ratio is free. Where too
+/// few bonds are left for a gradient, springs of the same shear modulus act as in [`super::NonlocalSolid`].
 #[derive(Clone, Copy, Debug)]
 pub struct Affine {
     shear: f64,

@@ -12,7 +12,8 @@ use polycore::numerics::ordered_sum;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// From this ratio of the largest tangent to that at rest on, every particle has the stiffness of its own bonds.
+/// From this ratio of the largest tangent to that at rest on, every particle has the stiffness of its own
+/// bonds.
 const MUCH: f64 = 1.2;
 /// Least tangent of a bond in its particles' stiffness, over that at rest.
 const LEAST_TANGENT: f64 = 0.25;
@@ -34,7 +35,8 @@ impl<'a> BondMaterial<'a> {
         Self { law: Arc::new(law), modulus, end: None }
     }
 
-    /// With bonds that soften and bear nothing at a stretch λ_f, that of the weaker of their ends, see [`integrity`].
+    /// With bonds that soften and bear nothing at a stretch λ_f, that of the weaker of their ends, see
+    /// [`integrity`].
     pub fn softening(self, end: Property) -> Self {
         Self { end: Some(end), ..self }
     }
@@ -111,7 +113,8 @@ struct Kernels<'a> {
     material: BondMaterial<'a>,
     /// Energies of the fit, where it is not a table.
     fitted: Option<EnergyTable>,
-    /// Energies of the law over the range of stretches last requested: it costs more to sample than bonds to sum.
+    /// Energies of the law over the range of stretches last requested: it costs more to sample than bonds to
+    /// sum.
     table: Option<(StretchRange, EnergyTable)>,
     /// Tangents likewise.
     tangents: Option<(StretchRange, TangentTable)>,
@@ -211,8 +214,8 @@ impl<const D: usize> Response<D> for Kernels<'_> {
         modulus * ordered_sum(bonds.particles().par_chunks(CHUNK).map(of)) + lacking.unwrap_or(0.0)
     }
 
-    /// Half of a bond's energy 2kθ|ξ|φ w V_I V_J from either end. Beyond what is fitted q is constant: the energy grows with half
-    /// of it.
+    /// Half of a bond's energy 2kθ|ξ|φ w V_I V_J from either end. Beyond what is fitted q is constant: the
+    /// energy grows with half of it.
     fn released(&self, bonds: &dyn Bonds<D>, list: &[Overstretched], most: f64) -> Option<f64> {
         let law = &*self.material.law;
         let energy = |bond: &Overstretched| {

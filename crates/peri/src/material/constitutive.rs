@@ -9,12 +9,13 @@ use polycore::constitutive::{Flags, Law, Prediction, Workspace};
 use polycore::tensor::voigt::{self, Voigt, component};
 use std::cell::RefCell;
 
-/// W = W(C) + ½ a μ · residual, C = FᵀF, for any [`Law`] that has an energy and no stress at rest: correspondence with the
-/// stabilisation a = 1 (Silling 2017, doi:10.1016/j.cma.2017.03.043, made exact). In plane stress the law gives the stretch of the
-/// thickness by S₃₃ = 0.
+/// W = W(C) + ½ a μ · residual, C = FᵀF, for any [`Law`] that has an energy and no stress at rest:
+/// correspondence with the stabilisation a = 1 (Silling 2017, doi:10.1016/j.cma.2017.03.043, made exact). In
+/// plane stress the law gives the stretch of the thickness by S₃₃ = 0.
 ///
-/// The axes of an anisotropic law are those of the body; its μ is the mean over all directions ([`Law::moduli`]), and in a plane
-/// body z must be normal to one of its planes of symmetry. A learnt law is one with an energy: its stress at rest is 0 by construction.
+/// The axes of an anisotropic law are those of the body; its μ is the mean over all directions
+/// ([`Law::moduli`]), and in a plane body z must be normal to one of its planes of symmetry. A learnt law is
+/// one with an energy: its stress at rest is 0 by construction.
 #[derive(Clone, Debug)]
 pub struct Correspondence<L, const D: usize> {
     law: L,
@@ -33,8 +34,8 @@ impl<L: Law, const D: usize> Correspondence<L, D> {
     /// With the stabilisation a = 1: accurate in the bulk and at free surfaces.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a law without energy, with stress or without stiffness at rest, or, in a plane body, with shear stress out of
-    /// the plane.
+    /// [`Error::Parameter`] for a law without energy, with stress or without stiffness at rest, or, in a
+    /// plane body, with shear stress out of the plane.
     pub fn new(law: L, space: Space) -> Result<Self, Error> {
         Self::stabilised(law, space, 1.0)
     }
@@ -189,7 +190,8 @@ impl<L: Law, const D: usize> PointLaw<D> for Correspondence<L, D> {
     }
 }
 
-/// The largest of |S₁₃| and |S₂₃| at in-plane strains of 1, and of 2 % over 2 %, Pa: 0 if z is normal to a plane of symmetry.
+/// The largest of |S₁₃| and |S₂₃| at in-plane strains of 1, and of 2 % over 2 %, Pa: 0 if z is normal to a
+/// plane of symmetry.
 fn out_of_plane(law: &impl Law, memory: &mut Workspace) -> f64 {
     let rest = Voigt::new(1.0, 1.0, 1.0, 0.0, 0.0, 0.0);
     let tangent = law.tangent(&rest, memory).ok().and_then(|found| found.tangent);

@@ -8,12 +8,12 @@ use crate::error::Error;
 use crate::quadrature::mean;
 use polycore::langevin;
 
-/// Eight chains of n links each (Arruda & Boyce 1993, doi:10.1016/0022-5096(93)90013-6) on the nonlocal trace of C,
-/// S = tr FᵀF + residual, and on J = det F:
-/// W = ψ(I₁) − μ₀ ln J + ¼κ(J² − 1 − 2 ln J), μ = 2ψ′ = μ₀ (β/β₁)/Λ with Λ = √(I₁/3), β = 𝓛⁻¹(Λ/√n), β₁ = 𝓛⁻¹(1/√n).
+/// Eight chains of n links each (Arruda & Boyce 1993, doi:10.1016/0022-5096(93)90013-6) on the nonlocal trace
+/// of C, S = tr FᵀF + residual, and on J = det F: W = ψ(I₁) − μ₀ ln J + ¼κ(J² − 1 − 2 ln J), μ = 2ψ′ = μ₀
+/// (β/β₁)/Λ with Λ = √(I₁/3), β = 𝓛⁻¹(Λ/√n), β₁ = 𝓛⁻¹(1/√n).
 ///
-/// I₁ = S in three dimensions, S + 1 in plane strain, and S + λ₃² in plane stress, where the stretch λ₃ of the thickness
-/// follows from W; incompressible sheets have λ₃ = 1/J.
+/// I₁ = S in three dimensions, S + 1 in plane strain, and S + λ₃² in plane stress, where the stretch λ₃ of
+/// the thickness follows from W; incompressible sheets have λ₃ = 1/J.
 #[derive(Clone, Copy, Debug)]
 pub struct EightChain<const D: usize> {
     space: Space,
@@ -27,7 +27,8 @@ pub struct EightChain<const D: usize> {
     filter: bool,
 }
 
-/// Relative extension beyond which β grows linearly: a chain that a load step stretches too far has a force nevertheless.
+/// Relative extension beyond which β grows linearly: a chain that a load step stretches too far has a force
+/// nevertheless.
 pub(super) const LINEAR: f64 = 0.995;
 /// Excess of I₁ below which the energy is an integral of μ, which does not cancel.
 const SMALL: f64 = 0.05;
@@ -65,7 +66,8 @@ impl<const D: usize> EightChain<D> {
         Ok(law)
     }
 
-    /// The same with U(bJ), b the average over nearest neighbours of a lattice: pressures of large bulk moduli become smoother at corners.
+    /// The same with U(bJ), b the average over nearest neighbours of a lattice: pressures of large bulk
+    /// moduli become smoother at corners.
     ///
     /// # Errors
     /// [`Error::Parameter`] in plane stress, whose thickness gives way.

@@ -1,13 +1,16 @@
-//! A bound of the greatest frequency of a [`super::NonlocalSolid`] at any deformation and with any bonds broken, by Schur's test.
+//! A bound of the greatest frequency of a [`super::NonlocalSolid`] at any deformation and with any bonds
+//! broken, by Schur's test.
 //!
-//! F of a particle i depends on u_j by B_ij = V_j M⁻¹ξ/(|ξ|² Σ_J V_J), on its own by b_i = |Σ_j B_ij|. With k_i = ‖∂P/∂F‖ less what the
-//! springs of the stabilisation have, R_i = Σ_j |B_ij| + b_i and a_i = I_i k_i R_i the Hessian K of the energy has
+//! F of a particle i depends on u_j by B_ij = V_j M⁻¹ξ/(|ξ|² Σ_J V_J), on its own by b_i = |Σ_j B_ij|. With
+//! k_i = ‖∂P/∂F‖ less what the springs of the stabilisation have, R_i = Σ_j |B_ij| + b_i and a_i = I_i k_i
+//! R_i the Hessian K of the energy has
 //!
 //! K ≤ diag(V_j m_j), m_j = Σ_i (V_i/V_j) a_i |B_ij| + a_j b_j + springs, ρω² ≤ max m_j.
 //!
-//! That is proven and two to three times too much: waves on a lattice do not reach all signs that Schur's test allows. So the first two terms
-//! are taken by [`WAVES`] and the springs by the greatest of Σ_j ω(1 − cos k·ξ) over Σ_j ω, both measured. Shape tensors come in by R_i: few
-//! bonds are stiff, and it is their neighbours among whom that is shared.
+//! That is proven and two to three times too much: waves on a lattice do not reach all signs that Schur's
+//! test allows. So the first two terms are taken by [`WAVES`] and the springs by the greatest of Σ_j ω(1 −
+//! cos k·ξ) over Σ_j ω, both measured. Shape tensors come in by R_i: few bonds are stiff, and it is their
+//! neighbours among whom that is shared.
 
 use super::point::{Point, Reach};
 use super::point_law::PointLaw;
@@ -16,7 +19,8 @@ use crate::field::{CHUNK, chunk_range};
 use nalgebra::SVector;
 use rayon::prelude::*;
 
-/// Part of the bound by Schur's test that frequencies reach: at stretches of 1 to 3 and with up to half of the bonds broken.
+/// Part of the bound by Schur's test that frequencies reach: at stretches of 1 to 3 and with up to half of
+/// the bonds broken.
 const WAVES: f64 = 0.4;
 
 /// Part of a family below which its bonds are few.

@@ -1,5 +1,5 @@
-//! A preconditioner for operators that act on smooth fields like ∫(Δθ)²: splines on grids, each twice as wide as the one before (Bramble,
-//! Pasciak & Xu 1990, doi:10.1090/S0025-5718-1990-1023042-6).
+//! A preconditioner for operators that act on smooth fields like ∫(Δθ)²: splines on grids, each twice as wide
+//! as the one before (Bramble, Pasciak & Xu 1990, doi:10.1090/S0025-5718-1990-1023042-6).
 
 use super::tensor::Vector;
 use crate::bonds::{BodyGeometry, CloudBonds};
@@ -125,7 +125,8 @@ impl<const D: usize> Grid<D> {
         coarse
     }
 
-    /// Visits each spline with the wider ones that it is a part of: spline c is that of 2c − 1, 2c, 2c + 1 and 2c + 2 with ¼, ¾, ¾ and ¼.
+    /// Visits each spline with the wider ones that it is a part of: spline c is that of 2c − 1, 2c, 2c + 1
+    /// and 2c + 2 with ¼, ¾, ¾ and ¼.
     fn parents(&self, coarse: [usize; D], mut visit: impl FnMut(usize, usize, f64)) {
         let mut place = [0_usize; D];
         for node in 0..self.weights.len() {

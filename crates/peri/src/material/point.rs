@@ -9,7 +9,8 @@ use nalgebra::SVector;
 /// D λ_min(M) below which a family has no deformation gradient. Intact corners have 0.50 and more.
 pub(super) const LEAST_SHAPE: f64 = 0.1;
 
-/// (|q̂|δ)² of the largest gradient that particles one spacing apart feel: 2.69 to 3.09 for δ of 2 to 6 spacings.
+/// (|q̂|δ)² of the largest gradient that particles one spacing apart feel: 2.69 to 3.09 for δ of 2 to 6
+/// spacings.
 pub(super) const GRADIENT: f64 = 3.1;
 
 /// What a particle knows of its family.
@@ -110,7 +111,8 @@ impl<const D: usize> Point<D> {
         terms[0][0][3] = self.slope;
     }
 
-    /// A η + (Q + A 1) ξ + P (θ_J − θ_I), over Σ_K V_K, of both ends, Pa/m²: |ξ|² times the force density without springs.
+    /// A η + (Q + A 1) ξ + P (θ_J − θ_I), over Σ_K V_K, of both ends, Pa/m²: |ξ|² times the force density
+    /// without springs.
     pub(super) fn linear(&self, other: &Self, bond: &Bond<D>) -> [f64; D] {
         let slope = self.slope + other.slope;
         let relief =
@@ -143,7 +145,8 @@ impl<const D: usize> Point<D> {
         std::array::from_fn(|a| unit * (linear[a] + relief[a]) + pull[a])
     }
 
-    /// Brings the deformation to Σ_J (V_J/|ξ|²) η⊗ξ, Σ_J (V_J/|ξ|²) η⊗(θ_J − θ_I) and Σ_J (V_J/|ξ|²)|η|² over the intact bonds.
+    /// Brings the deformation to Σ_J (V_J/|ξ|²) η⊗ξ, Σ_J (V_J/|ξ|²) η⊗(θ_J − θ_I) and Σ_J (V_J/|ξ|²)|η|² over
+    /// the intact bonds.
     pub(super) fn deform(&mut self, moment: Tensor<D>, shifted: Tensor<D>, square: f64) {
         let (dimension, moment) = (D as f64, moment / self.intact);
         let gradient = moment * self.inverse;

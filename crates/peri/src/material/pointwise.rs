@@ -8,8 +8,9 @@ use crate::potential::{BondPotential, LinearBond, StretchRange};
 use polycore::numerics::ordered_sum;
 use rayon::prelude::*;
 
-/// Both passes of a material over a whole body, for one that has something faster than plain loops over bonds. The states and
-/// forces must be those of [`Material::prepare`] and [`Material::force`] but for rounding.
+/// Both passes of a material over a whole body, for one that has something faster than plain loops over
+/// bonds. The states and forces must be those of [`Material::prepare`] and [`Material::force`] but for
+/// rounding.
 pub trait Passes<M: Material<D> + ?Sized, const D: usize>: Send + Sync {
     /// The first pass: states of all sites.
     fn prepare(

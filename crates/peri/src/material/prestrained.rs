@@ -1,13 +1,15 @@
-//! Bond laws in a body whose particles would have another shape if they were free: eigenstrains of printing, swelling, heat.
+//! Bond laws in a body whose particles would have another shape if they were free: eigenstrains of printing,
+//! swelling, heat.
 
 use super::bonded::mixed;
 use super::{Bond, BondMaterial, Family, Material};
 use crate::bonds::BodyGeometry;
 use std::sync::Arc;
 
-/// A bond law whose bonds are at rest at the stretch λ* = |(1 + ε*)n|, with n = ξ/|ξ| and the mean ε* of the prestrains of both ends:
-/// the energy of a bond is w = |ξ|λ*φ(λ/λ*), its tension t = φ′(λ/λ*). A free body with a uniform ε* takes the displacement ε*X without any force,
-/// and rigid rotations change nothing. 1 + n·ε*n in the place of λ* would leave stresses of second order in a free body.
+/// A bond law whose bonds are at rest at the stretch λ* = |(1 + ε*)n|, with n = ξ/|ξ| and the mean ε* of the
+/// prestrains of both ends: the energy of a bond is w = |ξ|λ*φ(λ/λ*), its tension t = φ′(λ/λ*). A free body
+/// with a uniform ε* takes the displacement ε*X without any force, and rigid rotations change nothing. 1 +
+/// n·ε*n in the place of λ* would leave stresses of second order in a free body.
 ///
 /// By plain loops over bonds, several times slower than [`BondMaterial`].
 #[derive(Clone)]

@@ -1,10 +1,11 @@
 //! What makes an irregular cloud pass the patch test: a field θ, found once.
 //!
-//! Families of an irregular cloud see B_IJ = ω_IJ M⁻¹ξ of each bond, F = Σ_J ζ⊗B_IJ. Uniform stress P leaves the force −P h_I on a
-//! particle, h_I = Σ_J (V_J B_JI − V_I B_IJ), which is 0 inside of a lattice and not in a cloud. With
-//! B_IJ + ω_IJ z_IJ(θ), z(θ) = θ_J − θ_I − G ξ, G = Σ_J ω (θ_J − θ_I)⊗ξ M⁻¹, affine deformations stay exact (Σ_J ω z⊗ξ = 0), and
-//! h + Lθ takes the place of h, with L of the stabilisation, f = −Lu where A = 1 and P = 0: symmetric and positive definite as soon as some
-//! particles have θ = 0. Cf. Chen, Hillman & Rüter 2013, doi:10.1002/nme.4512.
+//! Families of an irregular cloud see B_IJ = ω_IJ M⁻¹ξ of each bond, F = Σ_J ζ⊗B_IJ. Uniform stress P leaves
+//! the force −P h_I on a particle, h_I = Σ_J (V_J B_JI − V_I B_IJ), which is 0 inside of a lattice and not in
+//! a cloud. With B_IJ + ω_IJ z_IJ(θ), z(θ) = θ_J − θ_I − G ξ, G = Σ_J ω (θ_J − θ_I)⊗ξ M⁻¹, affine
+//! deformations stay exact (Σ_J ω z⊗ξ = 0), and h + Lθ takes the place of h, with L of the stabilisation, f =
+//! −Lu where A = 1 and P = 0: symmetric and positive definite as soon as some particles have θ = 0. Cf. Chen,
+//! Hillman & Rüter 2013, doi:10.1002/nme.4512.
 
 use super::levels::Levels;
 use super::point::LEAST_SHAPE;
@@ -24,17 +25,18 @@ const OPEN: f64 = 0.5;
 /// Spacings within which such a cone has no neighbour.
 const NEAR: f64 = 2.0;
 
-/// θ with h + Lθ = 0 in all particles whose family no surface cuts, and θ = 0 elsewhere, for [`crate::bonds::BondForces::set_relief`]; `None` where there
-/// is no such particle, and of lattices, which need none. To be found before any bond breaks: θ stays what it is, and the bonds that
-/// are left keep their part of the correction, so that forces follow from an energy however many break.
+/// θ with h + Lθ = 0 in all particles whose family no surface cuts, and θ = 0 elsewhere, for
+/// [`crate::bonds::BondForces::set_relief`]; `None` where there is no such particle, and of lattices, which
+/// need none. To be found before any bond breaks: θ stays what it is, and the bonds that are left keep their
+/// part of the correction, so that forces follow from an energy however many break.
 pub fn relief<const D: usize>(bonds: &dyn Bonds<D>) -> Option<Field<D>> {
     let Kind::Cloud(cloud) = bonds.kind() else { return None };
     let inside = complete(cloud);
     inside.contains(&true).then(|| Problem::new(cloud, inside).solve())
 }
 
-/// Which families lie inside of the body: no bond leads to a particle at a surface that is nearer than δ − ½Δx (its half cell ends
-/// there), and no cut has parted them.
+/// Which families lie inside of the body: no bond leads to a particle at a surface that is nearer than δ −
+/// ½Δx (its half cell ends there), and no cut has parted them.
 fn complete<const D: usize>(cloud: &CloudBonds<D>) -> Vec<bool> {
     let directions = directions::<D>();
     let sites = 0..cloud.sites();
@@ -106,7 +108,8 @@ impl<'a, const D: usize> Problem<'a, D> {
         Self { cloud, places, terms, force: Field::zeros(cloud.sites()), inside, families }
     }
 
-    /// Conjugate gradients. L is about a biharmonic operator: its diagonal alone takes iterations as the square of the body's size.
+    /// Conjugate gradients. L is about a biharmonic operator: its diagonal alone takes iterations as the
+    /// square of the body's size.
     fn solve(mut self) -> Field<D> {
         let sites = self.cloud.sites();
         // −h
@@ -136,7 +139,8 @@ impl<'a, const D: usize> Problem<'a, D> {
         field
     }
 
-    /// −h, or −Lu, inside, m² (2D: times the thickness) and m³: forces on particles where P = 1, and where A = 1.
+    /// −h, or −Lu, inside, m² (2D: times the thickness) and m³: forces on particles where P = 1, and where
+    /// A = 1.
     fn apply(&mut self, displacement: Option<&[Vector<D>]>) -> Vec<Vector<D>> {
         if let Some(displacement) = displacement {
             let mut field = Field::zeros(displacement.len());

@@ -21,7 +21,8 @@ pub struct LawCover {
 /// What a material does over a range of stretches, in one unit.
 #[derive(Clone, Copy, Debug)]
 pub struct LawRange {
-    /// max |t′| + (D − 1)·max(t/λ, 0): D times the mean tangent of bonds in all directions, where it is greatest.
+    /// max |t′| + (D − 1)·max(t/λ, 0): D times the mean tangent of bonds in all directions, where it is
+    /// greatest.
     pub mean_tangent: f64,
     /// min |t′|.
     pub least_tangent: f64,
@@ -34,13 +35,14 @@ pub trait Response<const D: usize>: Send + Sync {
     /// A bond law and its kθ, N/m⁶, about as stiff as this material: its own where it is one.
     fn bond_law(&self) -> (&dyn BondPotential, f64);
 
-    /// Lamé's λ, Pa, in addition to that of [`Self::bond_law`]: how much stiffer volumes are than those of bonds.
+    /// Lamé's λ, Pa, in addition to that of [`Self::bond_law`]: how much stiffer volumes are than those of
+    /// bonds.
     fn volumetric(&self) -> f64 {
         0.0
     }
 
-    /// Brings the law to a range of stretches; a bound of the relative tangent of bonds, N/m⁶: with u_I = Σ_J 2 w V_J/|ξ|
-    /// no particle is stiffer than tangent × u_I.
+    /// Brings the law to a range of stretches; a bound of the relative tangent of bonds, N/m⁶: with u_I = Σ_J
+    /// 2 w V_J/|ξ| no particle is stiffer than tangent × u_I.
     ///
     /// # Errors
     /// As [`crate::potential::KernelFit::new`].
@@ -57,7 +59,8 @@ pub trait Response<const D: usize>: Send + Sync {
     /// Whether forces of a particle depend on more than its own bonds.
     fn has_points(&self) -> bool;
 
-    /// Force densities, N/m³, of whole pieces from the site `start` on; collects the stretches observed if asked.
+    /// Force densities, N/m³, of whole pieces from the site `start` on; collects the stretches observed if
+    /// asked.
     fn force(
         &self,
         bonds: &dyn Bonds<D>,
@@ -76,8 +79,8 @@ pub trait Response<const D: usize>: Send + Sync {
     /// Energy of the body, J; `observed` holds the stretches within which the law itself is to be taken.
     fn energy(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, observed: StretchRange) -> f64;
 
-    /// Energy of bonds about to be severed, J, where it does not depend on others; `most` is the largest stretch of the law
-    /// itself. `None`: what the body loses when they are.
+    /// Energy of bonds about to be severed, J, where it does not depend on others; `most` is the largest
+    /// stretch of the law itself. `None`: what the body loses when they are.
     fn released(&self, bonds: &dyn Bonds<D>, list: &[Overstretched], most: f64) -> Option<f64>;
 
     /// The least stretch λ* at which any bond is at rest; critical stretches are multiples of λ*.
@@ -96,8 +99,9 @@ pub trait Response<const D: usize>: Send + Sync {
         overstretched(bonds, displacement, critical, seen)
     }
 
-    /// Intact bonds of free particles that are stretched, and whose breaking would release more than `limit`, J/m³, with that
-    /// energy, each from both ends, by site and index; none of materials without [`super::Material::released_energy`].
+    /// Intact bonds of free particles that are stretched, and whose breaking would release more than `limit`,
+    /// J/m³, with that energy, each from both ends, by site and index; none of materials without
+    /// [`super::Material::released_energy`].
     fn overloaded(
         &mut self,
         bonds: &dyn Bonds<D>,
@@ -109,11 +113,12 @@ pub trait Response<const D: usize>: Send + Sync {
         Vec::new()
     }
 
-    /// Whether bonds differ so much in their tangent, of which `tangent` is the greatest, that every particle needs the
-    /// stiffness of its own.
+    /// Whether bonds differ so much in their tangent, of which `tangent` is the greatest, that every particle
+    /// needs the stiffness of its own.
     fn has_own_stiffness(&self, tangent: f64) -> bool;
 
-    /// Bounds of the stiffness of all particles, in their order, over kθ: s_I of [`super::Material::stiffness`].
+    /// Bounds of the stiffness of all particles, in their order, over kθ: s_I of
+    /// [`super::Material::stiffness`].
     fn own_stiffness(
         &mut self,
         bonds: &dyn Bonds<D>,
@@ -121,8 +126,8 @@ pub trait Response<const D: usize>: Send + Sync {
         stretches: [f64; 2],
     ) -> Vec<f64>;
 
-    /// A bound of ρω², N/m⁴, of oscillations about the displacement last prepared, of materials with states of particles; where it is
-    /// below `enough`, `enough` will do. See [`super::Material::frequency_bound`].
+    /// A bound of ρω², N/m⁴, of oscillations about the displacement last prepared, of materials with states
+    /// of particles; where it is below `enough`, `enough` will do. See [`super::Material::frequency_bound`].
     fn frequency_bound(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, enough: f64) -> f64 {
         let _ = (bonds, displacement, enough);
         f64::INFINITY

@@ -1,4 +1,5 @@
-//! Bond laws whose bonds soften before they break: what the few soft bonds of a body lack against the law of the kernels.
+//! Bond laws whose bonds soften before they break: what the few soft bonds of a body lack against the law of
+//! the kernels.
 
 use super::{Bond, BondMaterial};
 use crate::bonds::{BondForces, Property};
@@ -7,11 +8,13 @@ use crate::potential::{EnergyTable, KernelFit, integrity, onset, softened_energy
 use polycore::numerics::ordered_sum;
 use rayon::prelude::*;
 
-/// The soft bonds of a displacement, by work items: site, and force density that its bonds lack, N/m³ (to be added).
+/// The soft bonds of a displacement, by work items: site, and force density that its bonds lack, N/m³ (to be
+/// added).
 #[derive(Default)]
 pub(super) struct Lacking(Vec<Vec<(u32, [f64; 3])>>);
 
-/// Visits the bonds beyond the onset that a work item finds, with their stretch and λ_f; all items find each once from both of its ends.
+/// Visits the bonds beyond the onset that a work item finds, with their stretch and λ_f; all items find each
+/// once from both of its ends.
 fn each<const D: usize>(
     end: &Property,
     bonds: &dyn BondForces<D>,

@@ -88,7 +88,8 @@ pub(super) struct Changes {
 }
 
 impl Changes {
-    /// Reshapes the particles from the site `first` on whose bonds have changed; `soft` are the softened bonds of these.
+    /// Reshapes the particles from the site `first` on whose bonds have changed; `soft` are the softened
+    /// bonds of these.
     pub(super) fn reshape<const D: usize>(
         self,
         law: &impl PointLaw<D>,

@@ -21,9 +21,9 @@ fn pulled<const D: usize>(law: &(impl PointLaw<D> + ?Sized), stretch: f64) -> (D
     at(bisect(0.0, 2.0, 60, |side| at(side).1[(1, 1)].partial_cmp(&0.0) != Some(Ordering::Greater))[1])
 }
 
-/// Energy density W, J/m³, of the uniform state of uniaxial tension in which the stress is first `strength`, Pa: force over the
-/// undeformed section (first Piola–Kirchhoff), as tensile tests of rubber report it (ISO 37). In plane strain the thickness is held. `None`
-/// where the law does not reach it.
+/// Energy density W, J/m³, of the uniform state of uniaxial tension in which the stress is first `strength`,
+/// Pa: force over the undeformed section (first Piola–Kirchhoff), as tensile tests of rubber report it (ISO
+/// 37). In plane strain the thickness is held. `None` where the law does not reach it.
 pub fn energy_at_strength<const D: usize>(law: &(impl PointLaw<D> + ?Sized), strength: f64) -> Option<f64> {
     let beyond = |strain: f64| {
         let stress = pulled(law, 1.0 + strain).1[(0, 0)];

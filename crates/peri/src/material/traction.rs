@@ -28,8 +28,9 @@ impl<const D: usize> PointLaw<D> for Uniform<D> {
 }
 
 /// The body force P h_I/V_I, N/m³, that balances a uniform Piola stress P in a [`NonlocalSolid`], with
-/// h_I = Σ_J (V_J I_J B_JI − V_I I_I B_IJ) and B_IJ = ω M⁻¹ξ/I: the area vector of the surface that the families of I and of its
-/// neighbours see. Σ h = 0; inside a lattice h = 0, and a flat face has a normal h in two horizons below it.
+/// h_I = Σ_J (V_J I_J B_JI − V_I I_I B_IJ) and B_IJ = ω M⁻¹ξ/I: the area vector of the surface that the
+/// families of I and of its neighbours see. Σ h = 0; inside a lattice h = 0, and a flat face has a normal h
+/// in two horizons below it.
 pub fn surface_load<const D: usize>(bonds: &dyn Bonds<D>, piola: Tensor<D>) -> Field<D> {
     let mut solid = Pointwise::new(NonlocalSolid(Uniform(piola)), bonds);
     let rest = Field::zeros(bonds.sites());

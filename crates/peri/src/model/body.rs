@@ -20,8 +20,8 @@ pub struct Body<const D: usize> {
 }
 
 impl<const D: usize> Body<D> {
-    /// A shape with particles `spacing` apart and a horizon of 3.015 spacings: a solid in three dimensions, in two a sheet
-    /// in plane stress, 1 m thick.
+    /// A shape with particles `spacing` apart and a horizon of 3.015 spacings: a solid in three dimensions,
+    /// in two a sheet in plane stress, 1 m thick.
     pub fn lattice(shape: Shape<D>, spacing: f64) -> Self {
         Self {
             operations: vec![Operation::Add(shape)],
@@ -53,7 +53,8 @@ impl<const D: usize> Body<D> {
         self
     }
 
-    /// Keeps the bonds across [`Gaps`]: between shapes that do not touch, and across cuts narrower than the horizon.
+    /// Keeps the bonds across [`Gaps`]: between shapes that do not touch, and across cuts narrower than the
+    /// horizon.
     pub fn bond_gaps(mut self) -> Self {
         self.bond_gaps = true;
         self
@@ -79,7 +80,8 @@ impl<const D: usize> Body<D> {
     /// Its particles and bonds.
     ///
     /// # Errors
-    /// [`Error::Geometry`] as [`lattice()`] and [`LatticeBonds::new`]; for a thickness that is not positive, too.
+    /// [`Error::Geometry`] as [`lattice()`] and [`LatticeBonds::new`]; for a thickness that is not positive,
+    /// too.
     pub fn build(&self) -> Result<LatticeBonds<D>, Error> {
         if !(self.thickness > 0.0 && self.thickness.is_finite()) {
             let found = self.thickness;

@@ -1,7 +1,7 @@
 //! One chain with extensible links: the implicit relation (2.41) in closed parametric form.
 //!
-//! With x = 𝓛(β): λ_b = exp(βx/D̂), λ̄ = √n̄ x λ_b, T = √n̄ β/λ_b. λ̄(β) is strictly monotone, so the only inversion is
-//! one scalar root; nothing implicit is left in a bond.
+//! With x = 𝓛(β): λ_b = exp(βx/D̂), λ̄ = √n̄ x λ_b, T = √n̄ β/λ_b. λ̄(β) is strictly monotone, so the only
+//! inversion is one scalar root; nothing implicit is left in a bond.
 
 use crate::error::Error;
 use polycore::langevin::{complement, derivative, free_energy, inverse, langevin};
@@ -78,8 +78,8 @@ impl Chain {
         self.at(self.beta(stretch))
     }
 
-    /// β at a chain stretch λ̄ (its magnitude is taken): x λ_b = λ̄/√n̄. A few ulp of the exact value for the given λ̄, also
-    /// at λ̄ ≈ √n̄, where the curve is nearly vertical; ∞ at ∞.
+    /// β at a chain stretch λ̄ (its magnitude is taken): x λ_b = λ̄/√n̄. A few ulp of the exact value for the
+    /// given λ̄, also at λ̄ ≈ √n̄, where the curve is nearly vertical; ∞ at ∞.
     pub fn beta(&self, stretch: f64) -> f64 {
         let ratio = stretch.abs() / self.links.sqrt();
         // also the limits: 0, ∞, and NaN for NaN
@@ -130,14 +130,16 @@ impl Chain {
 
     /// The greatest force, at β = D̂ up to terms e^{−2D̂}: where d(β/λ_b)/dβ = 0.
     pub fn strongest(&self) -> ChainPoint {
-        // root of 1 = β(x + βx′)/D̂; β(x + βx′) lies between 2β²/3 and β, so the root between D̂ and √(3D̂/2) or about
+        // root of 1 = β(x + βx′)/D̂; β(x + βx′) lies between 2β²/3 and β, so the root between D̂ and √(3D̂/2)
+        // or about
         let excess = |beta: f64| beta * (langevin(beta) + beta * derivative(beta)) / self.dissociation - 1.0;
         let (low, high) = (1e-3 * self.dissociation.min(1.0), 2.0 * self.dissociation.max(2.0));
         self.at(bisected(low, high, 200, |beta| excess(beta) < 0.0))
     }
 }
 
-/// The positive root of an increasing function, from its value and slope: Newton's method kept inside a shrinking bracket.
+/// The positive root of an increasing function, from its value and slope: Newton's method kept inside a
+/// shrinking bracket.
 fn newton(start: f64, upper: f64, value_and_slope: impl Fn(f64) -> (f64, f64)) -> f64 {
     let (mut low, mut high) = (0.0, upper);
     let mut at = start;
@@ -235,8 +237,8 @@ mod tests {
     }
 
     proptest! {
-        /// λ̄(β) back to β: what is lost is the rounding of λ̄ times the condition number of the inversion, which is
-        /// up to √D̂ at locking.
+        /// λ̄(β) back to β: what is lost is the rounding of λ̄ times the condition number of the inversion,
+        /// which is up to √D̂ at locking.
         #[test]
         fn inversion(exponent in -8.0..9.0f64, links in 0.0..6.0f64, dissociation in 0.0..9.0f64) {
             let chain = Chain::new(10f64.powf(links), 10f64.powf(dissociation)).unwrap();

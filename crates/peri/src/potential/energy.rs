@@ -7,7 +7,8 @@ const PIECES: usize = 2048;
 /// Pieces of the table of a fit, whose range is wider.
 const FINE: usize = 8192;
 
-/// φ(e)/kθ by cubic Hermite interpolation, with dφ/de = t/2λ at its nodes: relative error about 1e-9 of the largest.
+/// φ(e)/kθ by cubic Hermite interpolation, with dφ/de = t/2λ at its nodes: relative error about 1e-9 of the
+/// largest.
 pub struct EnergyTable {
     low: f64,
     step: f64,
@@ -29,8 +30,8 @@ impl EnergyTable {
         Self { low, step, nodes: (0..=PIECES).map(node).collect() }
     }
 
-    /// The energies of a fitted law, ½∫q de from the energy `at_rest` on: the potential of the forces that the kernels compute. `None`
-    /// for a law that only a table represents.
+    /// The energies of a fitted law, ½∫q de from the energy `at_rest` on: the potential of the forces that
+    /// the kernels compute. `None` for a law that only a table represents.
     pub fn of_fit(fit: &KernelFit, at_rest: f64) -> Option<Self> {
         if fit.numerator.is_empty() {
             return None;

@@ -1,7 +1,7 @@
 //! The bond law as the kernels need it: q = t/l as a function of e = l² − 1, so that no square root is taken.
 //!
-//! A stress-free law is q(e) = e·N(e)/D(e), exact at rest; any other N(e)/D(e). The cheapest polynomial or rational fit
-//! whose measured error meets the bound is taken, a cubic Hermite table where none does.
+//! A stress-free law is q(e) = e·N(e)/D(e), exact at rest; any other N(e)/D(e). The cheapest polynomial or
+//! rational fit whose measured error meets the bound is taken, a cubic Hermite table where none does.
 
 use super::{BondPotential, ratio};
 use crate::error::Error;
@@ -19,8 +19,8 @@ const LEAST_PIECES: usize = 64;
 const MOST_NODES: usize = 1 << 17;
 /// Cost of a division in multiply-adds, for choosing between candidates.
 const DIVISION: usize = 5;
-/// Sizes of numerator and denominator (beyond its 1): those that the kernels are compiled for, cheapest first. On stretch
-/// ranges that scenes meet, all the laws need nearly the same, hence the choice of ratios.
+/// Sizes of numerator and denominator (beyond its 1): those that the kernels are compiled for, cheapest
+/// first. On stretch ranges that scenes meet, all the laws need nearly the same, hence the choice of ratios.
 ///
 /// (10, 9) is padded to (11, 10): a size more than needed may have a pole and its zero in the same place.
 const CANDIDATES: [(usize, usize); 17] = [
@@ -63,7 +63,8 @@ pub struct KernelFit {
 }
 
 impl KernelFit {
-    /// Fits `law` over stretches `range` to relative error `bound` of q/e (q for laws that are not stress-free).
+    /// Fits `law` over stretches `range` to relative error `bound` of q/e (q for laws that are not
+    /// stress-free).
     ///
     /// # Errors
     /// [`Error::Parameter`] for an empty range or a bound that even the table misses.
@@ -107,8 +108,9 @@ impl KernelFit {
         target.table(range, bound, &dense)
     }
 
-    /// Keeps q constant outside of the range, where a fit must not be followed: bonds beyond it are about to break, and bonds
-    /// crushed below it push along ζ with a bounded stiffness, where the law's direction jumps as ζ passes through 0.
+    /// Keeps q constant outside of the range, where a fit must not be followed: bonds beyond it are about to
+    /// break, and bonds crushed below it push along ζ with a bounded stiffness, where the law's direction
+    /// jumps as ζ passes through 0.
     #[must_use]
     pub fn clamped(mut self) -> Self {
         self.clamp = self.range.map(|stretch| stretch * stretch - 1.0);
@@ -187,8 +189,8 @@ impl KernelFit {
         self.numerator.len() + self.denominator.len() + if self.denominator.is_empty() { 0 } else { DIVISION }
     }
 
-    /// Largest relative error of q over the range where single precision evaluates it; infinite for a table. The ratio of
-    /// a chain law over stretches of 0.1 to 3 loses all digits.
+    /// Largest relative error of q over the range where single precision evaluates it; infinite for a table.
+    /// The ratio of a chain law over stretches of 0.1 to 3 loses all digits.
     pub fn single_error(&self) -> f64 {
         if self.numerator.is_empty() {
             return f64::INFINITY;

@@ -11,8 +11,8 @@ const SMALL_ENERGY: f64 = 0.05;
 
 /// `chain-offset`: t = T(l) − T(1).
 ///
-/// K = T′(1) = 3 + 27/(5n̄) − 36/(n̄D̂) + O(n̄⁻²). Far beyond the greatest force of the chain t turns negative again and tends
-/// to −T(1); bonds break long before.
+/// K = T′(1) = 3 + 27/(5n̄) − 36/(n̄D̂) + O(n̄⁻²). Far beyond the greatest force of the chain t turns
+/// negative again and tends to −T(1); bonds break long before.
 pub struct BondStretch {
     chain: Chain,
     force_at_rest: f64,
@@ -70,8 +70,8 @@ impl BondPotential for Shifted {
 pub struct NetworkStretch(pub Chain);
 
 impl NetworkStretch {
-    /// g(l) of Eq. (2.38): stretch of a chain in a network of which one direction is stretched by l at constant volume.
-    /// Least at l = 1, where it is 1; ∞ at 0 and at ∞.
+    /// g(l) of Eq. (2.38): stretch of a chain in a network of which one direction is stretched by l at
+    /// constant volume. Least at l = 1, where it is 1; ∞ at 0 and at ∞.
     pub fn chain_stretch(stretch: f64) -> f64 {
         if stretch == f64::INFINITY {
             return f64::INFINITY;

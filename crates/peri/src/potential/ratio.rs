@@ -20,8 +20,8 @@ pub(super) struct Ratio {
 }
 
 impl Ratio {
-    /// Every zero of D keeps a distance from [low, high]: 2 % of its width, or a quarter of that to the singular
-    /// point −1.
+    /// Every zero of D keeps a distance from [low, high]: 2 % of its width, or a quarter of that to the
+    /// singular point −1.
     pub fn has_no_pole(&self, low: f64, high: f64) -> bool {
         let width = high - low;
         let margin = (0.02 * width).min(0.25 * (low + 1.0));
@@ -46,11 +46,12 @@ impl Ratio {
     }
 }
 
-/// The ratio with `p` coefficients of N and `q` of D beyond its 1 of nearly least relative error at the samples (x, f),
-/// if its error can be brought below `bound`.
+/// The ratio with `p` coefficients of N and `q` of D beyond its 1 of nearly least relative error at the
+/// samples (x, f), if its error can be brought below `bound`.
 ///
-/// Sanathanan and Koerner's iteration (1963, doi:10.1109/TAC.1963.1105517), with N and D in polynomials orthogonal under
-/// the current weights, so that neither a wide range nor a steep D costs digits; then Lawson's reweighting.
+/// Sanathanan and Koerner's iteration (1963, doi:10.1109/TAC.1963.1105517), with N and D in polynomials
+/// orthogonal under the current weights, so that neither a wide range nor a steep D costs digits; then
+/// Lawson's reweighting.
 pub(super) fn fit(samples: &[(f64, f64)], p: usize, q: usize, bound: f64) -> Option<Ratio> {
     let at: Vec<f64> = samples.iter().map(|(x, _)| *x).collect();
     let mut weights = vec![1.0; at.len()];
@@ -134,8 +135,8 @@ fn step(
     Some(Step { ratio, divisor: divided, errors })
 }
 
-/// Polynomials orthonormal under weights on points, by Arnoldi's recurrence (Brubeck, Nakatsukasa and Trefethen 2021,
-/// doi:10.1137/19M130100X).
+/// Polynomials orthonormal under weights on points, by Arnoldi's recurrence (Brubeck, Nakatsukasa and
+/// Trefethen 2021, doi:10.1137/19M130100X).
 struct Orthogonal {
     /// Column k: weight × polynomial of degree k at the points.
     columns: DMatrix<f64>,

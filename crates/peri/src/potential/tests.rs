@@ -18,7 +18,8 @@ fn every_law() {
     for (links, dissociation) in [(720.0, 1200.0), (100.0, 2300.0), (8.0, 50.0)] {
         for (name, law) in laws(links, dissociation) {
             for stretch in [0.2, 0.5, 0.9, 0.999, 1.001, 1.1, 1.5, 2.0, 3.0, 5.0, 20.0] {
-                // central differences: truncation h²/6 of the third derivative, rounding ε/h of values up to ~n̄
+                // central differences: truncation h²/6 of the third derivative, rounding ε/h of values up to
+                // ~n̄
                 let h = 1e-5 * stretch;
                 let slope = |f: &dyn Fn(f64) -> f64| (f(stretch + h) - f(stretch - h)) / (2.0 * h);
                 let (t, k) = (law.tension(stretch), law.tension_derivative(stretch));
@@ -101,8 +102,9 @@ fn printed_law_never_rests() {
     assert!((1..=100).all(|k| printed.tension(0.01 * f64::from(k)) > 0.0));
 }
 
-/// (2.61)–(2.65) with the second derivatives of (2.39), n̄ kept where (2.67) and (2.69) lose it, against the closed form; and
-/// the value that (2.72) takes from λ̄ = λ_b = 1, β → 0: 3 − 9/(n̄D̂ + 3), where 3 − 9/(D̂ + 3) is printed.
+/// (2.61)–(2.65) with the second derivatives of (2.39), n̄ kept where (2.67) and (2.69) lose it, against the
+/// closed form; and the value that (2.72) takes from λ̄ = λ_b = 1, β → 0: 3 − 9/(n̄D̂ + 3), where 3 − 9/(D̂
+/// + 3) is printed.
 #[test]
 fn tangent_with_the_links_on_the_bond_energy() {
     use polycore::langevin;
@@ -231,8 +233,8 @@ fn values_of_the_formulation() {
     }
 }
 
-/// formulation.md, "Max relative error of a table" (n̄ = 720, D̂ = 1200, λ̄ 0.3 … 1.25√n̄). Its figures have two digits
-/// or one, and depend on the sampling: within 30 % here.
+/// formulation.md, "Max relative error of a table" (n̄ = 720, D̂ = 1200, λ̄ 0.3 … 1.25√n̄). Its figures have
+/// two digits or one, and depend on the sampling: within 30 % here.
 #[test]
 fn interpolation_errors_of_the_formulation() {
     let chain = Chain::new(720.0, 1200.0).unwrap();
@@ -281,8 +283,8 @@ fn interpolation_errors_of_the_formulation() {
     evidence::within("error of the linear table, 200 nodes", linear, 0.7 * 1.6e-3, 1.3 * 1.6e-3);
 }
 
-/// Every law on every range a scene is likely to need meets the default bound, by a form no dearer than stated; the fit is
-/// what it says it is.
+/// Every law on every range a scene is likely to need meets the default bound, by a form no dearer than
+/// stated; the fit is what it says it is.
 #[test]
 fn fits_meet_their_bound() {
     for (name, law) in laws(720.0, 1200.0) {

@@ -10,9 +10,9 @@ const TIP: f64 = 2.0;
 
 /// J-integral of a crack of a plane solid that grows along an axis, over a ring about its tip.
 ///
-/// J = Σ V/t (P_ij u_i,1 − W δ_1j) ∂q/∂X_j along the axis 1, J/m²: the domain form of Li, Shih & Needleman (1985),
-/// doi:10.1016/0013-7944(85)90029-3, of Rice's integral in the reference configuration, for flanks without traction. q falls linearly
-/// from 1 at the inner radius to 0 at the outer.
+/// J = Σ V/t (P_ij u_i,1 − W δ_1j) ∂q/∂X_j along the axis 1, J/m²: the domain form of Li, Shih & Needleman
+/// (1985), doi:10.1016/0013-7944(85)90029-3, of Rice's integral in the reference configuration, for flanks
+/// without traction. q falls linearly from 1 at the inner radius to 0 at the outer.
 pub struct JIntegral {
     sites: Vec<u32>,
     /// V/t ∇q of each site, m.
@@ -21,7 +21,8 @@ pub struct JIntegral {
 }
 
 impl JIntegral {
-    /// Finds the particles whose distance from `tip`, m, is between two radii, m, of a body of this thickness, m.
+    /// Finds the particles whose distance from `tip`, m, is between two radii, m, of a body of this
+    /// thickness, m.
     ///
     /// # Errors
     /// [`Error::Geometry`]: no particle is there.
@@ -81,8 +82,8 @@ pub struct CrackTip {
 }
 
 impl CrackTip {
-    /// Place along the axis of the farthest particle at rest with damage in the range, and the largest distance from 0 across it of
-    /// those near it, m; NaN where there is none.
+    /// Place along the axis of the farthest particle at rest with damage in the range, and the largest
+    /// distance from 0 across it of those near it, m; NaN where there is none.
     pub fn value<const D: usize>(&self, bonds: &dyn Bonds<D>) -> [f64; 2] {
         let [low, high] = self.damage;
         let damaged = |&site: &u32| {

@@ -41,13 +41,14 @@ impl<const D: usize> StressEvaluator<D> {
         Self(Kind::Nothing)
     }
 
-    /// An evaluator of a bond law that is fitted to a relative error of `bound`; where bonds break the law is `clamped` beyond the
-    /// fitted stretches.
+    /// An evaluator of a bond law that is fitted to a relative error of `bound`; where bonds break the law is
+    /// `clamped` beyond the fitted stretches.
     pub fn of_bonds(material: BondMaterial<'static>, bound: f64, clamped: bool) -> Self {
         Self(Kind::Bonds { material, bound, clamped, last: Mutex::new(None) })
     }
 
-    /// An evaluator of a solid; `bonds` are those of the body as it was built. A law `learnt` from data has flags.
+    /// An evaluator of a solid; `bonds` are those of the body as it was built. A law `learnt` from data has
+    /// flags.
     pub fn of_solid(law: Arc<dyn PointLaw<D>>, learnt: bool, bonds: &dyn Bonds<D>) -> Self {
         let states = Mutex::new(Pointwise::new(NonlocalSolid(law.clone()), bonds));
         Self(Kind::Solid { law, learnt, states })
@@ -61,8 +62,8 @@ impl<const D: usize> StressEvaluator<D> {
         }
     }
 
-    /// Sums forces of the bonds of `sites` to the sites that `wanted` names, N, each on the particle in the first: `visit` takes
-    /// that site and the sum.
+    /// Sums forces of the bonds of `sites` to the sites that `wanted` names, N, each on the particle in the
+    /// first: `visit` takes that site and the sum.
     pub fn forces(
         &self,
         bonds: &dyn Bonds<D>,
@@ -124,8 +125,8 @@ impl<const D: usize> StressEvaluator<D> {
 
     /// Couples Σ V_I V_J (x_J − x_I) × T_IJ of the bonds of `sites` to the sites that `wanted` names, N m.
     ///
-    /// Bonds of solids are not parallel to their forces, T_IJ − T_JI, and Σ_J V_J (x_J − x_I) × T_IJ = 0 in a whole family alone.
-    /// With it, the moment of the forces of `sites` is what the body transmits.
+    /// Bonds of solids are not parallel to their forces, T_IJ − T_JI, and Σ_J V_J (x_J − x_I) × T_IJ = 0 in a
+    /// whole family alone. With it, the moment of the forces of `sites` is what the body transmits.
     pub fn couple(
         &self,
         bonds: &dyn Bonds<D>,
@@ -172,8 +173,8 @@ impl<const D: usize> StressEvaluator<D> {
         Some([piola, cauchy])
     }
 
-    /// Eshelby's energy–momentum ∇uᵀP − W 1 of a solid at some sites, Pa; `visit` takes the place in `sites` with it. Nothing
-    /// of bond laws, and of particles without deformation gradient.
+    /// Eshelby's energy–momentum ∇uᵀP − W 1 of a solid at some sites, Pa; `visit` takes the place in `sites`
+    /// with it. Nothing of bond laws, and of particles without deformation gradient.
     pub fn energy_momentum(
         &self,
         bonds: &dyn Bonds<D>,
@@ -194,7 +195,8 @@ impl<const D: usize> StressEvaluator<D> {
         }
     }
 
-    /// Where and why a learnt law is uncertain, particle by particle; none where it is not at work; `None` for laws in closed form.
+    /// Where and why a learnt law is uncertain, particle by particle; none where it is not at work; `None`
+    /// for laws in closed form.
     pub fn flags(&self, bonds: &dyn Bonds<D>, state: &State<D>) -> Option<Vec<Flags>> {
         let Kind::Solid { law, learnt: true, states } = &self.0 else { return None };
         let states = prepared(states, bonds, state);

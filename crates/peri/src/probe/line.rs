@@ -1,9 +1,11 @@
-//! Fields along lines through the body at rest, between particles by moving least squares with a linear basis.
+//! Fields along lines through the body at rest, between particles by moving least squares with a linear
+//! basis.
 //!
-//! Lancaster & Salkauskas (1981), doi:10.1090/S0025-5718-1981-0616367-1, over the nearest particle and those that intact bonds
-//! join to it, with the weights w = (δ/d − 1)⁴ of their distances d: a linear field is exact, and a particle has its own value.
-//! No value crosses a crack of the body at rest: the nearest particle is one on the same side, and so is what is bonded to it.
-//! Where bonds broke later, the side is that of the nearest particle.
+//! Lancaster & Salkauskas (1981), doi:10.1090/S0025-5718-1981-0616367-1, over the nearest particle and those
+//! that intact bonds join to it, with the weights w = (δ/d − 1)⁴ of their distances d: a linear field is
+//! exact, and a particle has its own value. No value crosses a crack of the body at rest: the nearest
+//! particle is one on the same side, and so is what is bonded to it. Where bonds broke later, the side is
+//! that of the nearest particle.
 
 use crate::bonds::{BodyGeometry, Bonds, CellGrid, Kind};
 use crate::geometry::{Cut, length, severed};
@@ -15,8 +17,8 @@ const NEAR: f64 = 1e-9;
 const TIE: f64 = 1e-6;
 /// Extent along a direction, over the largest, below which particles have none there.
 const FLAT: f64 = 1e-10;
-/// How often a value may enter through the slope along one direction: from particles nearly in a row, a place beside it would
-/// take large multiples of small differences.
+/// How often a value may enter through the slope along one direction: from particles nearly in a row, a place
+/// beside it would take large multiples of small differences.
 const MOST: f64 = 5.0;
 
 /// Particles around a line, between which fields are interpolated.
@@ -30,8 +32,8 @@ pub struct LineSampler<'a, const D: usize> {
     most: f64,
 }
 
-/// How far a particle stands for the body along each axis, m: half its cell; in a cloud, which has no cells, the whole edge of
-/// the square or cube of its volume.
+/// How far a particle stands for the body along each axis, m: half its cell; in a cloud, which has no cells,
+/// the whole edge of the square or cube of its volume.
 fn reach<const D: usize>(bonds: &dyn Bonds<D>, site: usize) -> f64 {
     match bonds.kind() {
         Kind::Lattice(lattice) => 0.5 * lattice.spacing(),
@@ -57,8 +59,8 @@ impl<'a, const D: usize> LineSampler<'a, D> {
         Self { bonds, cuts, grid: CellGrid::new(&places, most), sites, places, most }
     }
 
-    /// Sites whose values make up that at a place of the line, m, and their weights; none outside of the body, and where the nearest
-    /// particles lie on both sides of a crack.
+    /// Sites whose values make up that at a place of the line, m, and their weights; none outside of the
+    /// body, and where the nearest particles lie on both sides of a crack.
     pub fn weights(&self, at: [f64; D]) -> Option<Vec<(usize, f64)>> {
         let (bonds, small) = (self.bonds, self.bonds.spacing());
         if self.sites.is_empty() {
@@ -228,7 +230,8 @@ mod tests {
         assert!(value(&bonds, [9.2, 3.0], &jump).is_some());
     }
 
-    /// A crack nearer to one row: what lies in the cells of that row but below the crack belongs to the row below.
+    /// A crack nearer to one row: what lies in the cells of that row but below the crack belongs to the row
+    /// below.
     #[test]
     fn no_value_crosses_a_crack_beside_a_row() {
         let cut = Cut { corner: [-1.0, 3.4], edges: [[4.5, 0.0], [0.0; 2]] };

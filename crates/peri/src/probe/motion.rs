@@ -1,4 +1,5 @@
-//! Motion of parts of a body: mean displacement, best-fit rotation, strain between marks, the front of a wave.
+//! Motion of parts of a body: mean displacement, best-fit rotation, strain between marks, the front of a
+//! wave.
 
 use crate::bonds::Bonds;
 use crate::solver::State;
@@ -9,7 +10,8 @@ pub fn mean_displacement<const D: usize>(state: &State<D>, sites: &[u32], axis: 
     sum / sites.len() as f64
 }
 
-/// Rotation of some sites about an axis through the origin that fits best, rad: the angle of Σ (X × x, X · x) across the axis.
+/// Rotation of some sites about an axis through the origin that fits best, rad: the angle of Σ (X × x, X · x)
+/// across the axis.
 pub fn rotation<const D: usize>(bonds: &dyn Bonds<D>, state: &State<D>, sites: &[u32], axis: usize) -> f64 {
     let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
     let (mut cross, mut dot) = (0.0, 0.0);
@@ -42,7 +44,8 @@ pub fn strain<const D: usize>(bonds: &dyn Bonds<D>, state: &State<D>, marks: &[V
     length(true) / length(false) - 1.0
 }
 
-/// Front of a wave that runs along an axis: where the largest velocity of a plane of particles falls below a part of the largest.
+/// Front of a wave that runs along an axis: where the largest velocity of a plane of particles falls below a
+/// part of the largest.
 pub struct WaveFront {
     /// Planes at right angles to the axis, ascending: place, m, and particles.
     planes: Vec<(f64, Vec<u32>)>,
@@ -51,7 +54,8 @@ pub struct WaveFront {
 }
 
 impl WaveFront {
-    /// Sorts the particles of some sites into planes across the axis; the front has `part` of the largest velocity.
+    /// Sorts the particles of some sites into planes across the axis; the front has `part` of the largest
+    /// velocity.
     pub fn new<const D: usize>(bonds: &dyn Bonds<D>, mut sites: Vec<u32>, axis: usize, part: f64) -> Self {
         let place = |site: u32| bonds.position(site as usize)[axis];
         sites.sort_by(|&a, &b| place(a).total_cmp(&place(b)).then(a.cmp(&b)));

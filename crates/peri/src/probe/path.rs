@@ -1,4 +1,5 @@
-//! Paths of two quantities: swings over time, places that are reached, the envelope of equilibria that snap back.
+//! Paths of two quantities: swings over time, places that are reached, the envelope of equilibria that snap
+//! back.
 
 use std::f64::consts::PI;
 
@@ -11,8 +12,8 @@ pub fn unwrapped(mut rows: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     rows
 }
 
-/// First half swing of a pendulum from rows of time and angle: the first row beyond the zero that ends it, and the time of that
-/// zero; the frequency is π over it.
+/// First half swing of a pendulum from rows of time and angle: the first row beyond the zero that ends it,
+/// and the time of that zero; the frequency is π over it.
 pub fn first_swing(rows: &[(f64, f64)]) -> Option<(usize, f64)> {
     let most = rows.iter().map(|r| r.1.abs()).fold(0.0, f64::max);
     let inside = rows.iter().position(|r| r.1.abs() >= 0.5 * most && most > 0.0)?;
@@ -28,7 +29,8 @@ pub fn crossing(rows: &[(f64, f64)], place: f64) -> Option<f64> {
     Some(t0 + (place - x0) / (x1 - x0) * (t1 - t0))
 }
 
-/// Load at a displacement of a path of displacements and loads that begins at rest, between two points linearly.
+/// Load at a displacement of a path of displacements and loads that begins at rest, between two points
+/// linearly.
 pub fn load_at(path: impl IntoIterator<Item = [f64; 2]>, displacement: f64) -> Option<f64> {
     let mut before = [0.0; 2];
     for here in path {
@@ -41,9 +43,9 @@ pub fn load_at(path: impl IntoIterator<Item = [f64; 2]>, displacement: f64) -> O
     None
 }
 
-/// Envelope that a test machine records of equilibria that snap back: the greatest load at each displacement of a path of
-/// displacements and loads, linear between them; at the greatest displacement the fall to the load at the end of the path.
-/// Displacements, ascending, and loads.
+/// Envelope that a test machine records of equilibria that snap back: the greatest load at each displacement
+/// of a path of displacements and loads, linear between them; at the greatest displacement the fall to the
+/// load at the end of the path. Displacements, ascending, and loads.
 pub fn envelope(path: &[[f64; 2]]) -> [Vec<f64>; 2] {
     let mut at: Vec<f64> = path.iter().map(|point| point[0]).collect();
     at.sort_by(f64::total_cmp);
@@ -75,7 +77,8 @@ mod tests {
 
     #[test]
     fn a_machine_sees_the_upper_branch_and_the_fall() {
-        // up to 3 N at 3 m, back to 1 m, a second branch that crosses the first one's range, and the end at 2 m
+        // up to 3 N at 3 m, back to 1 m, a second branch that crosses the first one's range, and the end at 2
+        // m
         let path = [[0.0, 0.0], [3.0, 3.0], [1.0, 0.5], [2.0, 2.5], [2.0, 0.0]];
         let [at, load] = envelope(&path);
         assert_eq!(at, [0.0, 1.0, 2.0, 3.0, 3.0]);

@@ -1,7 +1,8 @@
 //! Adaptive dynamic relaxation: damped pseudo-dynamics with unit time step, a fictitious mass from the bonds'
 //! stiffness and a damping from the Rayleigh quotient of the last increment, until the forces balance.
-//! Underwood (1983), in Computational Methods for Transient Analysis; Kilic & Madenci (2010), doi:10.1016/j.tafmec.2010.08.001,
-//! with the quotient taken on increments (the displacement-weighted form has negative stiffness in many iterations).
+//! Underwood (1983), in Computational Methods for Transient Analysis; Kilic & Madenci (2010),
+//! doi:10.1016/j.tafmec.2010.08.001, with the quotient taken on increments (the displacement-weighted form
+//! has negative stiffness in many iterations).
 
 use super::balance::Goal;
 use super::load_stepping::{Equilibrium, QuasiStatic};
@@ -127,7 +128,8 @@ impl RelaxationSolver {
         } else {
             0.0
         };
-        // where bonds soften the quotient is negative and would leave them to swing indefinitely: a long search is damped
+        // where bonds soften the quotient is negative and would leave them to swing indefinitely: a long
+        // search is damped
         let late = state.counts.iteration.saturating_sub(LONG) as f64 / LONG as f64;
         let damping = (2.0 * quotient.max(0.0).sqrt()).clamp(LATE_DAMPING * late.min(1.0), 1.9);
         let goal = settings.goal();

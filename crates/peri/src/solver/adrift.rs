@@ -1,9 +1,12 @@
-//! Loads without an equilibrium: parts of a body that bear a force and that nothing holds, and displacements far beyond the body.
+//! Loads without an equilibrium: parts of a body that bear a force and that nothing holds, and displacements
+//! far beyond the body.
 //!
-//! Intact bonds divide a body into parts. Supports prescribe single components, so that a part of which component d is nowhere prescribed
-//! bears no reaction along d: where its forces along d do not vanish it has no equilibrium at any displacement. Where every such sum
-//! vanishes, forces that do not follow the body leave its rotation a potential that is bounded, so that no other mechanism lacks an
-//! equilibrium: only translations are looked at. Contact pushes: a plane may hold what presses on it, a part held along d what lies behind it.
+//! Intact bonds divide a body into parts. Supports prescribe single components, so that a part of which
+//! component d is nowhere prescribed bears no reaction along d: where its forces along d do not vanish it has
+//! no equilibrium at any displacement. Where every such sum vanishes, forces that do not follow the body
+//! leave its rotation a potential that is bounded, so that no other mechanism lacks an equilibrium: only
+//! translations are looked at. Contact pushes: a plane may hold what presses on it, a part held along d what
+//! lies behind it.
 
 use super::load::Loads;
 use super::scale::Scale;
@@ -15,7 +18,8 @@ use crate::field::Field;
 use std::collections::BTreeMap;
 use std::fmt;
 
-/// Displacement over the size of the body, or over the largest prescribed one, beyond which it is no equilibrium's.
+/// Displacement over the size of the body, or over the largest prescribed one, beyond which it is no
+/// equilibrium's.
 const FAR: f64 = 1e3;
 
 /// A part of a body, held together by intact bonds, whose forces along an axis nothing balances.
@@ -75,7 +79,8 @@ struct Piece<const D: usize> {
     extent: [[f64; 2]; D],
 }
 
-/// The first part of a body with forces along an axis that add up to more than `tolerance` of their sizes, and that nothing can hold.
+/// The first part of a body with forces along an axis that add up to more than `tolerance` of their sizes,
+/// and that nothing can hold.
 pub fn adrift<const D: usize>(
     bonds: &dyn BodyGeometry<D>,
     loads: &Loads<D>,

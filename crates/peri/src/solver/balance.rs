@@ -2,9 +2,9 @@
 //!
 //! - the reactions ‖F_held‖₂ and the body forces ‖b‖₂;
 //! - a twentieth of what these were in any equilibrium so far, for bodies that are torn;
-//! - a hundredth of what bonds at the grips would pull if the body were strained by min(U/L, 1): δ‖s_held‖₂, with U the
-//!   largest prescribed displacement, L the body's diagonal and s = Σ_J 2kθK w V_J/|ξ|, for bodies that grips move
-//!   without resistance;
+//! - a hundredth of what bonds at the grips would pull if the body were strained by min(U/L, 1): δ‖s_held‖₂,
+//!   with U the largest prescribed displacement, L the body's diagonal and s = Σ_J 2kθK w V_J/|ξ|, for bodies
+//!   that grips move without resistance;
 //! - what rounding of displacements alone makes of forces, 4ε‖s u‖₂, over the tolerance.
 
 use super::passes::Sums;

@@ -8,11 +8,12 @@ use crate::bonds::{Neighbour, Overstretched, Softened, fingerprint};
 use crate::contact::Contact;
 use crate::potential::StretchRange;
 
-/// Softening that an equilibrium may still lack: bonds of it bear up to this part of an intact bond's force too much.
+/// Softening that an equilibrium may still lack: bonds of it bear up to this part of an intact bond's force
+/// too much.
 const LAG: f64 = 0.01;
 
-/// What bonds beyond the onset come to, each with what its breaking would release: those that break, and all that are soft then; `None`
-/// where no integrity falls by more than `lag`.
+/// What bonds beyond the onset come to, each with what its breaking would release: those that break, and all
+/// that are soft then; `None` where no integrity falls by more than `lag`.
 fn soften(
     law: Bilinear,
     soft: &[Softened],
@@ -131,8 +132,8 @@ impl<const D: usize> System<'_, D> {
         sites
     }
 
-    /// Severs the bonds of particles that those left after `list` crush to nothing, and adds them to it: energies that no step could follow
-    /// would come from nothing. Both ends of each.
+    /// Severs the bonds of particles that those left after `list` crush to nothing, and adds them to it:
+    /// energies that no step could follow would come from nothing. Both ends of each.
     fn crumble(&mut self, state: &State<D>, list: &mut Vec<Overstretched>) -> Vec<[u32; 2]> {
         let mut pairs = Vec::new();
         let mut ends: Vec<u32> = list.iter().map(|bond| bond.site).collect();

@@ -12,7 +12,8 @@ impl<const D: usize> System<'_, D> {
     /// Brings bonds, law and loads to where a state is: at rest, or where an interrupted run was.
     ///
     /// # Errors
-    /// [`Error::Geometry`] where the state belongs to another body, or as [`crate::potential::KernelFit::new`].
+    /// [`Error::Geometry`] where the state belongs to another body, or as
+    /// [`crate::potential::KernelFit::new`].
     pub fn restore(&mut self, state: &mut State<D>) -> Result<(), Error> {
         state.fracture.restore(&mut *self.bonds)?;
         if state.fracture.intact.is_some() {
@@ -29,7 +30,8 @@ impl<const D: usize> System<'_, D> {
         self.fit(state, known)
     }
 
-    /// Whether every stretch of the state, `observed` if that is known, lies within the fit; widens it otherwise.
+    /// Whether every stretch of the state, `observed` if that is known, lies within the fit; widens it
+    /// otherwise.
     pub(super) fn covers_stretches(
         &mut self,
         state: &mut State<D>,

@@ -17,16 +17,18 @@ pub struct Breaking {
 pub enum Criterion {
     /// Critical bond stretch λ_c of the particles; a bond breaks at that of the weaker of its ends.
     Stretch(Property),
-    /// Energy that breaking a bond releases, over its share of the family, J/m³: the mean of both ends. For materials with
-    /// [`crate::material::Material::released_energy`]. Bonds of constrained particles do not break by it: grips do not tear.
+    /// Energy that breaking a bond releases, over its share of the family, J/m³: the mean of both ends. For
+    /// materials with [`crate::material::Material::released_energy`]. Bonds of constrained particles do not
+    /// break by it: grips do not tear.
     Energy(f64),
     /// The same of bonds that have a strength: they soften on their way to breaking.
     Softening(Bilinear),
 }
 
-/// A bond that softens, of energies over its share of the family, J/m³: with the greatest energy κ that its breaking would have
-/// released, e = √(κ/Y₀) and e_f = Y_c/Y₀ its integrity is d = 1 up to e = 1, (e_f − e)/[e(e_f − 1)] up to e_f, then 0: force over
-/// stretch is bilinear, and ∫Y(−dd) = Y_c. Cf. Camanho & Dávila, NASA/TM-2002-211737.
+/// A bond that softens, of energies over its share of the family, J/m³: with the greatest energy κ that its
+/// breaking would have released, e = √(κ/Y₀) and e_f = Y_c/Y₀ its integrity is d = 1 up to e = 1, (e_f −
+/// e)/[e(e_f − 1)] up to e_f, then 0: force over stretch is bilinear, and ∫Y(−dd) = Y_c. Cf. Camanho &
+/// Dávila, NASA/TM-2002-211737.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bilinear {
     /// Y₀, at which bonds begin to soften.
@@ -83,7 +85,8 @@ impl Criterion {
         }
     }
 
-    /// The largest stretch at which a law is evaluated: bonds beyond it are about to break, however long they are.
+    /// The largest stretch at which a law is evaluated: bonds beyond it are about to break, however long they
+    /// are.
     pub fn most(&self) -> f64 {
         1.25 * self.greatest_stretch() - 0.25
     }
@@ -94,12 +97,12 @@ impl Criterion {
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Policy {
-    /// In equilibrium: all overstretched bonds break at once, and a new equilibrium is sought until none is left.
-    /// Independent of the method.
+    /// In equilibrium: all overstretched bonds break at once, and a new equilibrium is sought until none is
+    /// left. Independent of the method.
     #[default]
     AtEquilibrium,
-    /// In every iteration of dynamic relaxation, on its way to equilibrium: cheaper, and breaks bonds that an overshoot
-    /// stretches.
+    /// In every iteration of dynamic relaxation, on its way to equilibrium: cheaper, and breaks bonds that an
+    /// overshoot stretches.
     EachIteration,
 }
 

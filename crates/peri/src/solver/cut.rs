@@ -1,4 +1,5 @@
-//! Load steps that are cut where bonds would break, until the load at which they do is known to a part of a step.
+//! Load steps that are cut where bonds would break, until the load at which they do is known to a part of a
+//! step.
 
 use super::state::State;
 use super::system::System;
@@ -19,9 +20,9 @@ impl<const D: usize> System<'_, D> {
         steps.filter(|&step| step > 0.0).fold(f64::INFINITY, f64::min) / self.refine.max(1) as f64
     }
 
-    /// Whether bonds would break in the first equilibrium of a step that may still be cut. The step then is: to factors
-    /// `shortest` apart, between which stretches, taken as linear in the load, come to the critical one; and `state` is
-    /// at the equilibrium before.
+    /// Whether bonds would break in the first equilibrium of a step that may still be cut. The step then is:
+    /// to factors `shortest` apart, between which stretches, taken as linear in the load, come to the
+    /// critical one; and `state` is at the equilibrium before.
     pub(super) fn cut(&mut self, state: &mut State<D>, shortest: f64) -> bool {
         let at = state.step;
         let before = at.checked_sub(1).map_or(0.0, |before| self.factors[before]);
@@ -45,7 +46,8 @@ impl<const D: usize> System<'_, D> {
         true
     }
 
-    /// Whether a plane would move by more than half a spacing beyond first touch in this step, which then is cut there.
+    /// Whether a plane would move by more than half a spacing beyond first touch in this step, which then is
+    /// cut there.
     pub(super) fn cut_at_touch(&mut self, state: &mut State<D>) -> bool {
         let Some(contact) = self.repulsion().filter(|_| !self.snap_back) else { return false };
         let [before, after] = contact.approach(&state.displacement);
@@ -60,8 +62,9 @@ impl<const D: usize> System<'_, D> {
         true
     }
 
-    /// Load factors `shortest` apart between those of two equilibria, of which the second has overstretched bonds: the largest
-    /// stretch, taken as linear in the load, becomes critical between them. Each equilibrium is a factor and a stretch.
+    /// Load factors `shortest` apart between those of two equilibria, of which the second has overstretched
+    /// bonds: the largest stretch, taken as linear in the load, becomes critical between them. Each
+    /// equilibrium is a factor and a stretch.
     pub(super) fn around(&self, before: [f64; 2], after: [f64; 2], shortest: f64) -> Vec<f64> {
         let length = after[0] - before[0];
         let part = (self.breaking_stretch().unwrap_or(1.0) - before[1]) / (after[1] - before[1]);

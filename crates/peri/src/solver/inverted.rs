@@ -1,4 +1,5 @@
-//! Prescribed displacements that no body can follow: grips that pass through each other, regions turned inside out.
+//! Prescribed displacements that no body can follow: grips that pass through each other, regions turned
+//! inside out.
 
 use super::load::Loads;
 use super::system::System;
@@ -6,7 +7,8 @@ use crate::bonds::BodyGeometry;
 use crate::error::Error;
 use std::collections::{BTreeMap, HashMap};
 
-/// Distance, in spacings, across their relative motion within which a particle of one grip passes through one of another.
+/// Distance, in spacings, across their relative motion within which a particle of one grip passes through one
+/// of another.
 const MEETS: f64 = 0.75;
 /// Grips that move as a whole: of more than these, displacements follow a field.
 const MOST_GRIPS: usize = 16;
@@ -16,7 +18,8 @@ pub const INVERTS: &str =
 /// D λ_min of the shape tensor below which neighbours do not span space.
 const SPANS: f64 = 0.1;
 
-/// What is found, or nothing, where prescribed displacements at any of the load factors `factors`, or between them, press a body through itself.
+/// What is found, or nothing, where prescribed displacements at any of the load factors `factors`, or between
+/// them, press a body through itself.
 pub fn inverted<const D: usize>(
     bonds: &dyn BodyGeometry<D>,
     loads: &Loads<D>,
@@ -71,7 +74,8 @@ fn passing<const D: usize>(bonds: &dyn BodyGeometry<D>, loads: &Loads<D>, factor
 /// A particle of the first grip: its place along the relative motion and across it, m, and its site.
 type Passed<const D: usize> = (f64, [f64; D], usize);
 
-/// Where and from which load factor on particles of the second grip, which moves by `apart` against the first, pass through it.
+/// Where and from which load factor on particles of the second grip, which moves by `apart` against the
+/// first, pass through it.
 fn passes<const D: usize>(
     bonds: &dyn BodyGeometry<D>,
     [here, there]: [&[usize]; 2],

@@ -1,6 +1,6 @@
-//! Limited-memory BFGS on the body's energy, by gradients alone, with a two-level preconditioner: Nocedal & Wright, Numerical
-//! Optimization (2006), §7.2; the step is taken where the slope along the direction has fallen enough (its curvature
-//! condition), found by secants.
+//! Limited-memory BFGS on the body's energy, by gradients alone, with a two-level preconditioner: Nocedal &
+//! Wright, Numerical Optimization (2006), §7.2; the step is taken where the slope along the direction has
+//! fallen enough (its curvature condition), found by secants.
 
 use super::balance::Goal;
 use super::load_stepping::{Equilibrium, QuasiStatic};
@@ -39,7 +39,8 @@ const CURVATURE: f64 = 1e-3;
 const STRETCH: f64 = 0.3;
 const CRUSH: f64 = 0.6;
 
-/// Largest change of a bond over its length in a step where bonds soften, so that none leaps over its energy's maximum.
+/// Largest change of a bond over its length in a step where bonds soften, so that none leaps over its
+/// energy's maximum.
 const LEAP: f64 = 0.3;
 /// Scale at which a direction dwarfs the bonds; a power of 2, so that nothing is rounded.
 const FAR: f64 = (1_u64 << 40) as f64;
@@ -53,8 +54,8 @@ pub struct Lbfgs {
     pub max_iterations: u64,
     /// Pairs of steps and gradient changes that are kept.
     pub memory: usize,
-    /// Edge of a cell of the coarse level over the particles' distance, at least 2; grows where the coarse level would
-    /// become too large.
+    /// Edge of a cell of the coarse level over the particles' distance, at least 2; grows where the coarse
+    /// level would become too large.
     pub coarsening: f64,
     /// Weight ω of the local part of the preconditioner.
     pub weight: f64,
@@ -104,7 +105,8 @@ pub struct LbfgsSolver<const D: usize> {
     direction: Field<D>,
     /// Whether the coarse level is left out: it has failed to give a descent.
     local_only: bool,
-    /// Searches with this preconditioner, iterations of the first of them, and whether the last took too many.
+    /// Searches with this preconditioner, iterations of the first of them, and whether the last took too
+    /// many.
     searches: u64,
     first: u64,
     worn: bool,
@@ -155,8 +157,8 @@ impl<const D: usize> LbfgsSolver<D> {
         self.preconditioner.coarse_size()
     }
 
-    /// Builds the preconditioner for the present state and forgets everything else: from here a run that begins with
-    /// this state takes the same way.
+    /// Builds the preconditioner for the present state and forgets everything else: from here a run that
+    /// begins with this state takes the same way.
     fn begin(&mut self, system: &mut System<D>, state: &State<D>, watch: &mut Watch<D>) -> Result<(), Error> {
         watch(&self.status(system, state, true), state)?;
         system.prepare(&state.displacement);
@@ -210,8 +212,8 @@ impl<const D: usize> LbfgsSolver<D> {
         self.places.add_scaled(&mut state.displacement, step, &self.direction);
     }
 
-    /// z = B g of the trial, then the direction from it; the slope along it. The steepest of what is left where the
-    /// memory gives no descent.
+    /// z = B g of the trial, then the direction from it; the slope along it. The steepest of what is left
+    /// where the memory gives no descent.
     fn direct(&mut self) -> f64 {
         let slope = self.memory.direction(&self.gradient, &self.image, &mut self.direction);
         if slope < 0.0 && slope.is_finite() {
@@ -271,8 +273,8 @@ impl<const D: usize> LbfgsSolver<D> {
         Ok(Search::Failed)
     }
 
-    /// How far a step may go along the direction where bonds soften at stretches up to e = `most`, or particles touch:
-    /// the energy is not convex there.
+    /// How far a step may go along the direction where bonds soften at stretches up to e = `most`, or
+    /// particles touch: the energy is not convex there.
     fn longest_step(&mut self, system: &System<D>, state: &State<D>, most: f64) -> f64 {
         let softens = system.material.bond_law().0.tension_derivative((1.0 + most).sqrt()) < 0.0;
         if !softens && system.repulsion().is_none() {

@@ -1,4 +1,5 @@
-//! Loads and supports: body forces and prescribed displacement components, proportional to one load factor but for regions that turn.
+//! Loads and supports: body forces and prescribed displacement components, proportional to one load factor
+//! but for regions that turn.
 
 use super::turn::Turned;
 use crate::bonds::BodyGeometry;
@@ -19,7 +20,8 @@ pub struct Support<const D: usize> {
 pub struct Loads<const D: usize> {
     /// Body force density at load factor 1, N/m³.
     pub body_force: Option<Field<D>>,
-    /// Prescribed displacement at load factor 1, m, where constrained; of turned regions its rate over the load factor.
+    /// Prescribed displacement at load factor 1, m, where constrained; of turned regions its rate over the
+    /// load factor.
     pub displacement: Option<Field<D>>,
     /// Bit d of a site: component d is constrained. Empty where nothing is.
     pub constrained: Vec<u8>,
@@ -30,7 +32,8 @@ pub struct Loads<const D: usize> {
 }
 
 impl<const D: usize> Loads<D> {
-    /// Collects regions, each given as its sites and what holds there; body forces add up, the last displacement applies.
+    /// Collects regions, each given as its sites and what holds there; body forces add up, the last
+    /// displacement applies.
     pub fn new(sites: usize, regions: &[(Vec<u32>, Support<D>)]) -> Self {
         let mut loads = Self::default();
         for (members, support) in regions {
@@ -72,8 +75,9 @@ impl<const D: usize> Loads<D> {
         }
     }
 
-    /// What the loads pull, N·m: Σ −F V·d over constrained components with d the rate of their displacement over the factor, and
-    /// Σ b V·u with b the body force at factor 1. `force` holds out-of-balance force densities.
+    /// What the loads pull, N·m: Σ −F V·d over constrained components with d the rate of their displacement
+    /// over the factor, and Σ b V·u with b the body force at factor 1. `force` holds out-of-balance force
+    /// densities.
     pub fn conjugates(
         &self,
         bonds: &dyn BodyGeometry<D>,
@@ -97,8 +101,8 @@ impl<const D: usize> Loads<D> {
         (pull, push)
     }
 
-    /// How far apart the prescribed displacements are at factor 1, m: √Σ_d (max − min)²; of turned regions the longest arc; `rigid` are
-    /// those of rigid planes.
+    /// How far apart the prescribed displacements are at factor 1, m: √Σ_d (max − min)²; of turned regions
+    /// the longest arc; `rigid` are those of rigid planes.
     pub fn reach(&self, bonds: &dyn BodyGeometry<D>, rigid: &[[f64; D]]) -> f64 {
         let mut turned = vec![false; if self.turned.is_empty() { 0 } else { bonds.sites() }];
         self.turned.iter().flat_map(|region| &region.sites).for_each(|&site| turned[site as usize] = true);
@@ -134,10 +138,10 @@ impl<const D: usize> Loads<D> {
         std::array::from_fn(|d| sum(d, 1.0).max(sum(d, -1.0)))
     }
 
-    /// The load, N, and the displacement, m, on which it works, from [`Loads::conjugates`]: the force conjugate to the
-    /// grips' distance `factor` · [`Loads::reach`]; where only forces are prescribed, these, and the mean displacement
-    /// of where they act along them (of both ends together where they pull at both).
-    /// `rigid` as [`Loads::reach`].
+    /// The load, N, and the displacement, m, on which it works, from [`Loads::conjugates`]: the force
+    /// conjugate to the grips' distance `factor` · [`Loads::reach`]; where only forces are prescribed, these,
+    /// and the mean displacement of where they act along them (of both ends together where they pull at
+    /// both). `rigid` as [`Loads::reach`].
     pub fn response(
         &self,
         bonds: &dyn BodyGeometry<D>,
@@ -170,8 +174,9 @@ impl<const D: usize> Loads<D> {
         self.held_regions.iter().map(of_region).collect()
     }
 
-    /// Force with which the regions of prescribed displacement hold or pull along each axis, N: their reactions in one
-    /// direction, or in the other if these are more. A particle counts in the first region that has it.
+    /// Force with which the regions of prescribed displacement hold or pull along each axis, N: their
+    /// reactions in one direction, or in the other if these are more. A particle counts in the first region
+    /// that has it.
     pub fn reaction(&self, bonds: &dyn BodyGeometry<D>, force: &Field<D>) -> [f64; D] {
         let mut counted = vec![false; self.constrained.len()];
         let (mut up, mut down) = ([0.0; D], [0.0; D]);
@@ -195,8 +200,9 @@ impl<const D: usize> Loads<D> {
         std::array::from_fn(|d| up[d].max(down[d]))
     }
 
-    /// An affine field u_d = a_d + Σ_e B_de X_e to start from: closest to the prescribed displacements where there are
-    /// any, in balance with the body forces otherwise. One row (a_d, B_d1, …) per component, at load factor 1.
+    /// An affine field u_d = a_d + Σ_e B_de X_e to start from: closest to the prescribed displacements where
+    /// there are any, in balance with the body forces otherwise. One row (a_d, B_d1, …) per component, at
+    /// load factor 1.
     pub fn affine_predictor(&self, bonds: &dyn BodyGeometry<D>, stiffness: f64) -> [[f64; 4]; D] {
         if self.displacement.is_some() {
             self.affine_closest(bonds)
@@ -249,9 +255,9 @@ impl<const D: usize> Loads<D> {
         result
     }
 
-    /// The homogeneous strain H whose bond forces do the same virtual work as the body forces in every homogeneous
-    /// strain: Σ_I V_I Σ_J kθK w V_J |ξ| (n·Hn)(n·Gn) = Σ_I V_I b·G X for all symmetric G (Galerkin's projection).
-    /// `stiffness` is kθK.
+    /// The homogeneous strain H whose bond forces do the same virtual work as the body forces in every
+    /// homogeneous strain: Σ_I V_I Σ_J kθK w V_J |ξ| (n·Hn)(n·Gn) = Σ_I V_I b·G X for all symmetric G
+    /// (Galerkin's projection). `stiffness` is kθK.
     fn affine_balance(&self, bonds: &dyn BodyGeometry<D>, stiffness: f64) -> [[f64; 4]; D] {
         let mut result = [[0.0; 4]; D];
         let Some(body_force) = &self.body_force else { return result };

@@ -1,4 +1,5 @@
-//! Load step after load step: a first guess, an equilibrium, the bonds that break in it, the next equilibrium.
+//! Load step after load step: a first guess, an equilibrium, the bonds that break in it, the next
+//! equilibrium.
 
 use super::method::{Finished, Method, Watch};
 use super::record::Record;
@@ -12,8 +13,8 @@ use crate::error::Error;
 /// A method that finds the equilibrium of a state at the load factor of its step.
 pub trait Equilibrium<const D: usize> {
     /// Moves the free components until the forces balance; leaves the force of the final displacement in
-    /// [`State::force`], counts iterations in [`Counts::iteration`](super::Counts) (reset by the caller) and the others. The stretches of that
-    /// displacement, where it has looked at them.
+    /// [`State::force`], counts iterations in [`Counts::iteration`](super::Counts) (reset by the caller) and
+    /// the others. The stretches of that displacement, where it has looked at them.
     ///
     /// # Errors
     /// [`Error::NotConverged`], [`Error::NotFinite`], and whatever `watch` returns.
@@ -50,13 +51,14 @@ impl<const D: usize, M: QuasiStatic<D>> Method<D> for M {
     }
 }
 
-/// Solves the remaining load steps of `state`; `finished` sees every finished step and, with [`StepControl::round`](super::StepControl) above 0,
-/// every equilibrium in which bonds have just broken.
+/// Solves the remaining load steps of `state`; `finished` sees every finished step and, with
+/// [`StepControl::round`](super::StepControl) above 0, every equilibrium in which bonds have just broken.
 ///
 /// # Errors
 /// As [`Equilibrium::equilibrate`], and whatever `finished` returns;
-/// [`Error::NoEquilibrium`] where nothing holds a part that bears a force, at the start or once it is torn off: `state` is then at the last
-/// finished step; [`Error::Geometry`] for prescribed displacements that press the body through itself.
+/// [`Error::NoEquilibrium`] where nothing holds a part that bears a force, at the start or once it is torn
+/// off: `state` is then at the last finished step; [`Error::Geometry`] for prescribed displacements that
+/// press the body through itself.
 pub fn load_stepping<const D: usize>(
     method: &mut dyn Equilibrium<D>,
     system: &mut System<D>,
@@ -163,9 +165,10 @@ fn step_by_step<const D: usize>(
     Ok(())
 }
 
-/// Moves the body with its grips and lets it start from rest. Where bonds may break, which takes many small steps, along
-/// the last equilibria u, u′, u″ by 3u − 3u′ + u″ where they are equally far apart and no bond broke since, by 2u − u′
-/// where there are two; affinely otherwise. Where grips turn, with the nearest of them.
+/// Moves the body with its grips and lets it start from rest. Where bonds may break, which takes many small
+/// steps, along the last equilibria u, u′, u″ by 3u − 3u′ + u″ where they are equally far apart and no bond
+/// broke since, by 2u − u′ where there are two; affinely otherwise. Where grips turn, with the nearest of
+/// them.
 fn predict<const D: usize>(system: &System<D>, state: &mut State<D>, predictor: &[[f64; 4]; D]) {
     let factor = system.factors[state.step];
     let at = |back: usize| {

@@ -1,9 +1,10 @@
 //! The last steps s and changes of the gradient y, and the direction that follows: Nocedal (1980),
-//! doi:10.1090/S0025-5718-1980-0572855-7, with the recursion carried out on inner products (Chen, Wang & Zhou 2014, NIPS 27),
-//! so that stored fields are read twice an iteration.
+//! doi:10.1090/S0025-5718-1980-0572855-7, with the recursion carried out on inner products (Chen, Wang & Zhou
+//! 2014, NIPS 27), so that stored fields are read twice an iteration.
 //!
-//! With an initial inverse γB, B the preconditioner, only s and w = B y are stored, in single precision: the pairs make up most of what an
-//! iteration reads, and a direction needs no more. All sums are in double precision.
+//! With an initial inverse γB, B the preconditioner, only s and w = B y are stored, in single precision: the
+//! pairs make up most of what an iteration reads, and a direction needs no more. All sums are in double
+//! precision.
 
 use super::passes::{LANES, sum};
 use super::places::in_order;
@@ -117,7 +118,8 @@ impl<const D: usize> Memory<D> {
         parts.iter().sum()
     }
 
-    /// Takes note of an accepted step α: s = α d, w = z − z_old, y = g − g_old. Pairs without curvature are not kept.
+    /// Takes note of an accepted step α: s = α d, w = z − z_old, y = g − g_old. Pairs without curvature are
+    /// not kept.
     pub fn add(
         &mut self,
         step: f64,

@@ -99,7 +99,8 @@ pub struct Pace {
     pub(super) part: f64,
     /// ρω² that steps are made for, without the margin.
     pub(super) covered: f64,
-    /// m at the last look, steps between it and the next, and steps until then; looks since steps were changed.
+    /// m at the last look, steps between it and the next, and steps until then; looks since steps were
+    /// changed.
     pub(super) last: f64,
     pub(super) every: u32,
     pub(super) due: u32,
@@ -135,8 +136,8 @@ impl StretchLook {
         Self { stretches, slack: 0.0 }
     }
 
-    /// Whether stretches may have left what is fitted, or reached the critical one. A bond's stretch changes by no more
-    /// than its ends' increments over its length.
+    /// Whether stretches may have left what is fitted, or reached the critical one. A bond's stretch changes
+    /// by no more than its ends' increments over its length.
     pub fn is_due(&self, fitted: [f64; 2], critical: Option<f64>) -> bool {
         let [low, high] = [self.stretches[0] - self.slack, self.stretches[1] + self.slack];
         // NaN looks, too

@@ -1,12 +1,14 @@
-//! How long explicit steps may be where the stiffness is that of a displacement, of solids: it grows with every stretch, where a body is
-//! crushed, and where bonds break.
+//! How long explicit steps may be where the stiffness is that of a displacement, of solids: it grows with
+//! every stretch, where a body is crushed, and where bonds break.
 //!
-//! m, [`crate::material::Response::frequency_bound`], bounds ρω² of a state at the cost of a force or less. The Lanczos iteration gives ω²
-//! itself and with it the part r = ρω²/m that frequencies reach; between two of them ω² is taken as r m/ρ. Steps are those of [`MARGIN`]
-//! times that. m is looked at where a step ends, before its forces act: a step that ends where it would have been too long, as one that
-//! crushes a particle does, is taken back and cut, so that no kick follows from it. Looks follow every step in which bonds broke or strains
-//! may have changed by [`STRAIN`], and otherwise are the more seldom the slower m grows; ω² is measured again where m or the stretches have
-//! come far from where they were: r changes with the stretches. All that follows from the state alone.
+//! m, [`crate::material::Response::frequency_bound`], bounds ρω² of a state at the cost of a force or less.
+//! The Lanczos iteration gives ω² itself and with it the part r = ρω²/m that frequencies reach; between two
+//! of them ω² is taken as r m/ρ. Steps are those of [`MARGIN`] times that. m is looked at where a step ends,
+//! before its forces act: a step that ends where it would have been too long, as one that crushes a particle
+//! does, is taken back and cut, so that no kick follows from it. Looks follow every step in which bonds broke
+//! or strains may have changed by [`STRAIN`], and otherwise are the more seldom the slower m grows; ω² is
+//! measured again where m or the stretches have come far from where they were: r changes with the stretches.
+//! All that follows from the state alone.
 
 use super::motion::Pace;
 use super::state::State;
@@ -17,7 +19,8 @@ use crate::bonds::stretch_range;
 
 /// Factor on ω² by which it may grow until steps are shortened.
 const MARGIN: f64 = 1.3;
-/// Factor by which ω² that steps are made for grows at most where one is taken back: where it ends tells little of where half of it would.
+/// Factor by which ω² that steps are made for grows at most where one is taken back: where it ends tells
+/// little of where half of it would.
 const CUT: f64 = 4.0;
 /// Factors on m, up and down, beyond which ω² is measured again.
 const ABOVE: f64 = 1.5;
@@ -47,7 +50,8 @@ impl Pace {
         self.due == 0 || self.strain > STRAIN
     }
 
-    /// Takes note of m: how soon the next look is due, half of what is left of the margin at the pace of before.
+    /// Takes note of m: how soon the next look is due, half of what is left of the margin at the pace of
+    /// before.
     fn see(&mut self, bound: f64) {
         let (grown, steps) = (bound / self.last, f64::from(self.every));
         let left = (MARGIN * self.covered / (self.part * bound)).max(1.0).ln();
@@ -84,7 +88,8 @@ impl VelocityVerlet {
             Pace { bound, part, covered, last: bound, every: 1, due: 1, known, ..Pace::default() };
     }
 
-    /// Looks at the state where a step ends, prepared, if that is due. True where the step was too long for it: steps are then shorter.
+    /// Looks at the state where a step ends, prepared, if that is due. True where the step was too long for
+    /// it: steps are then shorter.
     pub(super) fn is_too_long<const D: usize>(
         &self,
         system: &mut System<D>,
@@ -112,8 +117,8 @@ impl VelocityVerlet {
         true
     }
 
-    /// Follows the stiffness after a step, in which bonds have `broken` or not: shorter steps where the margin is used up, longer ones where
-    /// there is far more.
+    /// Follows the stiffness after a step, in which bonds have `broken` or not: shorter steps where the
+    /// margin is used up, longer ones where there is far more.
     pub(super) fn follow<const D: usize>(
         &self,
         system: &mut System<D>,

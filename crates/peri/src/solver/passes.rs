@@ -1,5 +1,5 @@
-//! The passes of an iteration over all sites: new forces with every sum over them, and the move of dynamic relaxation; the gradient of
-//! L-BFGS.
+//! The passes of an iteration over all sites: new forces with every sum over them, and the move of dynamic
+//! relaxation; the gradient of L-BFGS.
 
 use super::load::Loads;
 use super::places::Places;
@@ -103,8 +103,8 @@ pub fn force_pass<const D: usize>(
     (sums, observed)
 }
 
-/// New forces, the gradient −V F of the energy over particles (0 where constrained), the sums over forces, the stretches, and the slope
-/// of the energy along a direction.
+/// New forces, the gradient −V F of the energy over particles (0 where constrained), the sums over forces,
+/// the stretches, and the slope of the energy along a direction.
 pub fn gradient_pass<const D: usize>(
     system: &System<D>,
     state: &mut State<D>,

@@ -1,7 +1,8 @@
-//! Fields over particles alone: storage sites without a particle, which a lattice has many of, take no part in sums and products.
+//! Fields over particles alone: storage sites without a particle, which a lattice has many of, take no part
+//! in sums and products.
 //!
-//! Particle k of such a field is that of site `particles()[k]`: work item after work item of the storage, so that each of them has its
-//! own part.
+//! Particle k of such a field is that of site `particles()[k]`: work item after work item of the storage, so
+//! that each of them has its own part.
 
 use super::load::Loads;
 use crate::bonds::BodyGeometry;

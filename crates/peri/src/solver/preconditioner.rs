@@ -1,5 +1,5 @@
-//! An approximate inverse of the body's stiffness, for gradients of its energy: B g = ω g/(V M) + P A_c⁻¹ Pᵀ g, with the
-//! Gershgorin mass M of dynamic relaxation and a coarse level.
+//! An approximate inverse of the body's stiffness, for gradients of its energy: B g = ω g/(V M) + P A_c⁻¹ Pᵀ
+//! g, with the Gershgorin mass M of dynamic relaxation and a coarse level.
 
 use super::coarse::{Anchor, Body, Coarse, Survey};
 use super::mass::{has_own_mass, own_mass, update_unit_mass};
@@ -9,8 +9,8 @@ use super::system::System;
 use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field, chunk_range};
 
-/// Degrees of freedom of the coarse level at most, in two and three dimensions: so many in any body, one for so many particles, and so many
-/// however large the body is.
+/// Degrees of freedom of the coarse level at most, in two and three dimensions: so many in any body, one for
+/// so many particles, and so many however large the body is.
 const LEAST: [usize; 2] = [30_000, 8_000];
 const SHARE: [usize; 2] = [8, 40];
 const MOST: [usize; 2] = [125_000, 30_000];
@@ -39,8 +39,8 @@ impl<const D: usize> Preconditioner<D> {
         !self.local.is_empty()
     }
 
-    /// Builds it for the present state, and from nothing else: `weight` is ω, `coarsening` the edge of a coarse cell over
-    /// the particles' distance.
+    /// Builds it for the present state, and from nothing else: `weight` is ω, `coarsening` the edge of a
+    /// coarse cell over the particles' distance.
     pub fn build(&mut self, system: &mut System<D>, state: &State<D>, weight: f64, coarsening: f64) {
         // half the Gershgorin sum is about a particle's own stiffness
         let mut springs = Vec::new();
@@ -112,7 +112,8 @@ impl<const D: usize> Preconditioner<D> {
         }
     }
 
-    /// z = B g over particles, or its local part alone; g is zero where components are constrained, and so is z.
+    /// z = B g over particles, or its local part alone; g is zero where components are constrained, and so is
+    /// z.
     pub fn apply(&mut self, places: &Places, gradient: &Field<D>, result: &mut Field<D>, local_only: bool) {
         if let Some(coarse) = self.coarse.as_mut().filter(|_| !local_only) {
             coarse.solve(gradient);

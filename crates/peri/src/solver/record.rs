@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 pub struct Record {
     /// Load factor.
     pub factor: f64,
-    /// Force, N, that does the loads' work on `displacement`, see [`Loads::response`](super::Loads::response).
+    /// Force, N, that does the loads' work on `displacement`, see
+    /// [`Loads::response`](super::Loads::response).
     pub load: f64,
     /// Displacement of the grips against each other, or of where forces act, m.
     pub displacement: f64,

@@ -10,7 +10,8 @@ use rayon::prelude::*;
 /// Particles of a region from which the first guess measures distances.
 const SAMPLES: usize = 256;
 
-/// A region that carries free particles: its turn, its displacement at load factor 1, m, and places of some of its particles.
+/// A region that carries free particles: its turn, its displacement at load factor 1, m, and places of some
+/// of its particles.
 type Carrier<'a, const D: usize> = (Option<&'a Turned<D>>, [f64; D], Vec<[f64; D]>);
 
 impl<const D: usize> Loads<D> {
@@ -20,8 +21,8 @@ impl<const D: usize> Loads<D> {
         self.set_rates(bonds, 0.0, 0.0);
     }
 
-    /// Has [`Loads::displacement`] of turned regions be the rate of their displacement over the load factor between two factors: the
-    /// secant, at one factor the tangent.
+    /// Has [`Loads::displacement`] of turned regions be the rate of their displacement over the load factor
+    /// between two factors: the secant, at one factor the tangent.
     pub(super) fn set_rates(&mut self, bonds: &dyn BodyGeometry<D>, before: f64, after: f64) {
         let Some(field) = self.displacement.as_mut() else { return };
         for turned in &self.turned {
@@ -49,7 +50,8 @@ impl<const D: usize> Loads<D> {
         }
     }
 
-    /// The longest arc of turned particles against those that are not, m; of regions turned both ways their sum.
+    /// The longest arc of turned particles against those that are not, m; of regions turned both ways their
+    /// sum.
     pub(super) fn arc(&self, bonds: &dyn BodyGeometry<D>) -> f64 {
         let of = |turned: &Turned<D>| {
             let each = turned.sites.iter().map(|&site| turned.rotation.radius(bonds.position(site as usize)));
@@ -64,8 +66,8 @@ impl<const D: usize> Loads<D> {
         radius * (0..3).map(|d| span(d).powi(2)).sum::<f64>().sqrt()
     }
 
-    /// Moves free particles with the regions of prescribed displacement from a load factor to another, as near regions do: each turns a
-    /// particle by a part of its turn, the parts in proportion to 1/distance.
+    /// Moves free particles with the regions of prescribed displacement from a load factor to another, as
+    /// near regions do: each turns a particle by a part of its turn, the parts in proportion to 1/distance.
     pub(super) fn carry(
         &self,
         bonds: &dyn BodyGeometry<D>,

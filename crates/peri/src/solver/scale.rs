@@ -69,8 +69,8 @@ impl Scale {
     }
 }
 
-/// Sums over the whole body in equilibrium. The first two vanish by Newton's third law, whatever the residual: bonds and
-/// contact pull both ends with one force, along the line between them.
+/// Sums over the whole body in equilibrium. The first two vanish by Newton's third law, whatever the
+/// residual: bonds and contact pull both ends with one force, along the line between them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Balance {
     /// |Σ V F| of the internal forces F, N.

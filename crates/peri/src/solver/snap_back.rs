@@ -1,14 +1,15 @@
-//! Responses that snap back: where bonds break and others would follow at once, the load is lowered until none would. The next
-//! break then controls the load, so that a crack advances event by event through equilibria.
+//! Responses that snap back: where bonds break and others would follow at once, the load is lowered until
+//! none would. The next break then controls the load, so that a crack advances event by event through
+//! equilibria.
 
 use super::cut::BY_STRETCH;
 use super::state::State;
 use super::system::System;
 
 impl<const D: usize> System<'_, D> {
-    /// Whether more bonds would break in the equilibrium after some broke. The load of the step then is lowered to half a
-    /// `shortest` step below that at which the largest stretch is critical, λ − 1 taken as proportional to the load; and `state`
-    /// is near the equilibrium there.
+    /// Whether more bonds would break in the equilibrium after some broke. The load of the step then is
+    /// lowered to half a `shortest` step below that at which the largest stretch is critical, λ − 1 taken as
+    /// proportional to the load; and `state` is near the equilibrium there.
     pub(super) fn lower(&mut self, state: &mut State<D>, shortest: f64) -> bool {
         let at = state.step;
         let factor = self.factors[at];
@@ -38,7 +39,8 @@ impl<const D: usize> System<'_, D> {
         true
     }
 
-    /// After a step whose load was lowered: puts factors before that of the next one, between which bonds break.
+    /// After a step whose load was lowered: puts factors before that of the next one, between which bonds
+    /// break.
     pub(super) fn raise(&mut self, state: &mut State<D>, shortest: f64) {
         let Some(above) = state.control.lowered.take() else { return };
         if state.step == self.factors.len() {

@@ -180,8 +180,8 @@ impl<const D: usize> State<D> {
         }));
     }
 
-    /// Goes back to the last finished step, or to the undeformed body; counts of work stay. Bonds are another's: see
-    /// [`Fracture::restore`].
+    /// Goes back to the last finished step, or to the undeformed body; counts of work stay. Bonds are
+    /// another's: see [`Fracture::restore`].
     pub(super) fn retreat(&mut self) {
         let zero = || Field::zeros(self.velocity.sites());
         let accepted = self.control.accepted.take().map_or_else(

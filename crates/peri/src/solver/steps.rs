@@ -1,4 +1,5 @@
-//! Load steps of a state: how far they are, where they have been cut, and the last one that can be gone back to.
+//! Load steps of a state: how far they are, where they have been cut, and the last one that can be gone back
+//! to.
 
 use super::fracture::Fracture;
 use crate::field::Field;
@@ -22,7 +23,8 @@ pub struct StepControl<const D: usize> {
     /// … which of them nobody has prescribed, and how often the present one has been.
     pub(super) inserted: Vec<usize>,
     pub(super) cuts: u32,
-    /// Factor and largest stretch of the equilibrium from which the load was lowered, see [`System::snap_back`](super::System::snap_back).
+    /// Factor and largest stretch of the equilibrium from which the load was lowered, see
+    /// [`System::snap_back`](super::System::snap_back).
     pub(super) lowered: Option<[f64; 2]>,
     /// The last finished step under given forces, which may tear the body apart.
     pub(super) accepted: Option<Box<Accepted<D>>>,
@@ -49,7 +51,8 @@ impl<const D: usize> StepControl<D> {
         self.inserted.sort_unstable();
     }
 
-    /// How many prescribed steps are over after the first `rows` of the history, the last of which is one of them.
+    /// How many prescribed steps are over after the first `rows` of the history, the last of which is one of
+    /// them.
     pub fn prescribed(&self, rows: usize) -> Option<usize> {
         let last = rows.checked_sub(1)?;
         let inserted = self.inserted.partition_point(|&row| row < last);

@@ -13,7 +13,8 @@ use crate::material::{Material, Response};
 use crate::potential::StretchRange;
 use std::borrow::Cow;
 
-/// Renewals of the normal forces of friction in a load step, and those after which they are averaged: large coefficients may alternate.
+/// Renewals of the normal forces of friction in a load step, and those after which they are averaged: large
+/// coefficients may alternate.
 const RENEWALS: u32 = 40;
 const ALTERNATING: u32 = 8;
 
@@ -27,7 +28,8 @@ pub struct System<'a, const D: usize> {
     pub loads: Cow<'a, Loads<D>>,
     /// Load factor at the end of each step.
     pub factors: Cow<'a, [f64]>,
-    /// Parts of a load step to which the load at which bonds break is found; 1: they break at the end of the step.
+    /// Parts of a load step to which the load at which bonds break is found; 1: they break at the end of the
+    /// step.
     pub refine: usize,
     /// Lower the load after bonds broke, until no others would break at once; with [`Self::refine`] above 1.
     pub snap_back: bool,
@@ -92,9 +94,10 @@ impl<'a, const D: usize> System<'a, D> {
         }
     }
 
-    /// The first pass over a new displacement, or over bonds that have changed: states of particles, the copy that kernels of clouds and of mixed
-    /// precision read, and pairs in contact where particles have moved far. To be called before the forces, once; how often pairs are looked for makes no difference
-    /// to any bit.
+    /// The first pass over a new displacement, or over bonds that have changed: states of particles, the copy
+    /// that kernels of clouds and of mixed precision read, and pairs in contact where particles have moved
+    /// far. To be called before the forces, once; how often pairs are looked for makes no difference to any
+    /// bit.
     pub fn prepare(&mut self, displacement: &Field<D>) {
         if let Some(contact) = self.contact.as_mut().filter(|contact| contact.repels()) {
             contact.update(&*self.bonds, displacement);
@@ -110,7 +113,8 @@ impl<'a, const D: usize> System<'a, D> {
         }
     }
 
-    /// Places rigid planes at the end of a load step, sets the rates of turned regions there, and has friction act from its start on.
+    /// Places rigid planes at the end of a load step, sets the rates of turned regions there, and has
+    /// friction act from its start on.
     pub(super) fn begin_step(&mut self, state: &State<D>) {
         let before = state.step.checked_sub(1).map_or(0.0, |before| self.factors[before]);
         let after = self.factors[state.step];
@@ -124,8 +128,8 @@ impl<'a, const D: usize> System<'a, D> {
         }
     }
 
-    /// Renews the normal forces of friction in an equilibrium; whether they have changed by more than `tolerance` of their sum, so that
-    /// another equilibrium is to be sought.
+    /// Renews the normal forces of friction in an equilibrium; whether they have changed by more than
+    /// `tolerance` of their sum, so that another equilibrium is to be sought.
     pub(super) fn renew_friction(&mut self, state: &mut State<D>, tolerance: f64) -> bool {
         let Some(contact) = self.contact.as_mut().filter(|contact| contact.rubs()) else { return false };
         let Some(start) = &state.contact.start else { return false };
@@ -236,8 +240,8 @@ impl<'a, const D: usize> System<'a, D> {
         Some(contact.touching(&*self.bonds, &state.displacement))
     }
 
-    /// Force densities of whole pieces from the site `start` on, without loads: the material, and all that acts between particles
-    /// beside it. After [`Self::prepare`].
+    /// Force densities of whole pieces from the site `start` on, without loads: the material, and all that
+    /// acts between particles beside it. After [`Self::prepare`].
     pub fn internal_force(
         &self,
         displacement: &Field<D>,
@@ -276,8 +280,9 @@ impl<'a, const D: usize> System<'a, D> {
         self.observer.map_or_else(Vec::new, |observer| observer(&*self.bonds, state))
     }
 
-    /// Row of history of a state: at a load factor with its conjugate sums, see [`Loads::conjugates`](super::Loads::conjugates), the stretches
-    /// `observed` and the `stored` energy, J. Not of an equilibrium: without residual and balance.
+    /// Row of history of a state: at a load factor with its conjugate sums, see
+    /// [`Loads::conjugates`](super::Loads::conjugates), the stretches `observed` and the `stored` energy, J.
+    /// Not of an equilibrium: without residual and balance.
     pub(super) fn row(
         &mut self,
         state: &State<D>,

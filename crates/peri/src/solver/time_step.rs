@@ -1,5 +1,5 @@
-//! The critical time step Δt_c = 2/ω_max of explicit dynamics: a bound for every deformation within a range of stretches,
-//! and the sharp value of one deformation.
+//! The critical time step Δt_c = 2/ω_max of explicit dynamics: a bound for every deformation within a range
+//! of stretches, and the sharp value of one deformation.
 
 use super::motion::BondSums;
 use super::state::State;
@@ -8,11 +8,11 @@ use crate::field::{CHUNK, Field, chunk_range};
 use polycore::numerics::ordered_sum;
 use rayon::prelude::*;
 
-/// Displacement, in shortest bonds, by which the tangent's force differences are taken: truncation and rounding are both
-/// about 1e-10 of the force.
+/// Displacement, in shortest bonds, by which the tangent's force differences are taken: truncation and
+/// rounding are both about 1e-10 of the force.
 const PROBE: f64 = 1e-5;
-/// Residual of the Ritz pair, over its value, at which the sharp frequency is good enough: a fine spectrum would take
-/// hundreds of forces for the digits that follow.
+/// Residual of the Ritz pair, over its value, at which the sharp frequency is good enough: a fine spectrum
+/// would take hundreds of forces for the digits that follow.
 const ENOUGH: f64 = 1e-2;
 /// Most steps of the Lanczos iteration.
 const MOST_STEPS: usize = 200;
@@ -48,11 +48,12 @@ pub fn critical(frequency_squared: f64) -> f64 {
     if frequency_squared > 0.0 { 2.0 / frequency_squared.sqrt() } else { f64::INFINITY }
 }
 
-/// ω_max² of the tangent −∂f/∂u/ρ at a state, 1/s², by the Lanczos iteration (1950, doi:10.6028/jres.045.026) on
-/// differences of forces, constrained components at rest; 0 where the greatest is not positive.
+/// ω_max² of the tangent −∂f/∂u/ρ at a state, 1/s², by the Lanczos iteration (1950, doi:10.6028/jres.045.026)
+/// on differences of forces, constrained components at rest; 0 where the greatest is not positive.
 ///
-/// Volumes are the weights of the inner product in which the tangent is symmetric. The Ritz value is a lower bound; with
-/// its residual, up to a hundredth of it, added it is on the safe side: half of a hundredth above what 200 steps give.
+/// Volumes are the weights of the inner product in which the tangent is symmetric. The Ritz value is a lower
+/// bound; with its residual, up to a hundredth of it, added it is on the safe side: half of a hundredth above
+/// what 200 steps give.
 pub fn largest_frequency_squared<const D: usize>(
     system: &mut System<D>,
     state: &mut State<D>,

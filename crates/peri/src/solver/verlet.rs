@@ -1,9 +1,10 @@
 //! Explicit dynamics: velocity Verlet, with every energy that the integrator exchanges.
 //!
-//! ρü = f + F(t)b − cρu̇ with the load factor F rising linearly over a ramp, or as [`System::course`] says; constrained components follow F(t)d and its rate.
-//! v₊ = v + ½Δt a, u ← u + Δt v₊, v ← v₊ + ½Δt a, the new a = (f + Fb)/ρ − cv; Swope et al. (1982),
-//! doi:10.1063/1.442716, Hairer, Lubich & Wanner (2003), doi:10.1017/S0962492902000144. Works are sums of
-//! ½(force before + force after)·Δu, which change ½ρ(v² − ¼Δt²a²) exactly: the energies balance to O(Δt²) without drift.
+//! ρü = f + F(t)b − cρu̇ with the load factor F rising linearly over a ramp, or as [`System::course`] says;
+//! constrained components follow F(t)d and its rate. v₊ = v + ½Δt a, u ← u + Δt v₊, v ← v₊ + ½Δt a, the new
+//! a = (f + Fb)/ρ − cv; Swope et al. (1982), doi:10.1063/1.442716, Hairer, Lubich & Wanner (2003),
+//! doi:10.1017/S0962492902000144. Works are sums of ½(force before + force after)·Δu, which change ½ρ(v² −
+//! ¼Δt²a²) exactly: the energies balance to O(Δt²) without drift.
 
 use super::method::{Finished, Method, Watch};
 use super::motion::{BondSums, Energies, Motion, StepLimits, StretchLook};
@@ -17,14 +18,15 @@ use crate::bonds::{StretchRange, stretch_range};
 use crate::contact::Contact;
 use crate::error::Error;
 
-/// Part of the energy turned over by which the kinetic energy may exceed what is available before the run is given up:
-/// far above the O(Δt²) error of steps below the critical one, passed within a few steps beyond it.
+/// Part of the energy turned over by which the kinetic energy may exceed what is available before the run is
+/// given up: far above the O(Δt²) error of steps below the critical one, passed within a few steps beyond it.
 const EXCESS: f64 = 0.25;
-/// Steps at the start in which a ramped load has not yet done work that the excess could be a part of: the kinetic energy
-/// exceeds the work by (3/n²)·¼ after n steps.
+/// Steps at the start in which a ramped load has not yet done work that the excess could be a part of: the
+/// kinetic energy exceeds the work by (3/n²)·¼ after n steps.
 const LENIENT: u64 = 8;
 
-/// Contact that is allowed for, over what was observed: the time step is not shortened for each particle that joins.
+/// Contact that is allowed for, over what was observed: the time step is not shortened for each particle that
+/// joins.
 const GROWTH: f64 = 1.25;
 
 /// Steps are planned anew where they may become longer by this.
@@ -37,7 +39,8 @@ const MOST_CUTS: u32 = 12;
 pub struct VelocityVerlet {
     /// Mass density ρ, kg/m³.
     pub density: f64,
-    /// Largest time step Δt, s; `None`: `safety` times the critical one, reduced where the law stiffens on the way.
+    /// Largest time step Δt, s; `None`: `safety` times the critical one, reduced where the law stiffens on
+    /// the way.
     pub time_step: Option<f64>,
     /// Part of the critical time step taken where none is given.
     pub safety: f64,
@@ -59,18 +62,19 @@ impl VelocityVerlet {
 }
 
 impl<const D: usize> Method<D> for VelocityVerlet {
-    /// Continues from `state` to the end time. Bonds break in every step whose stretches ask for it. `watch` sees every step
-    /// and may stop the run by an error; `finished` sees every row of the history. [`System::factors`] and
-    /// [`System::stop_below`] are not used.
+    /// Continues from `state` to the end time. Bonds break in every step whose stretches ask for it. `watch`
+    /// sees every step and may stop the run by an error; `finished` sees every row of the history.
+    /// [`System::factors`] and [`System::stop_below`] are not used.
     ///
-    /// A state that has not moved yet, or the equilibrium that another method found (its velocities reset), is where
-    /// time begins: [`State::work`] is set to the energy that is there, so that kinetic + stored + released + damped + rubbed = work
-    /// in every row but for O(Δt²).
+    /// A state that has not moved yet, or the equilibrium that another method found (its velocities reset),
+    /// is where time begins: [`State::work`] is set to the energy that is there, so that kinetic + stored +
+    /// released + damped + rubbed = work in every row but for O(Δt²).
     ///
     /// # Errors
-    /// [`Error::Parameter`] for settings out of their domain; [`Error::TimeStep`] for a time step beyond the critical one;
-    /// [`Error::Unstable`] where energy grows from nothing; [`Error::NotFinite`] for a state that is not finite at the
-    /// start; [`Error::Geometry`] as [`System::restore`]; whatever `watch` and `finished` return.
+    /// [`Error::Parameter`] for settings out of their domain; [`Error::TimeStep`] for a time step beyond the
+    /// critical one; [`Error::Unstable`] where energy grows from nothing; [`Error::NotFinite`] for a state
+    /// that is not finite at the start; [`Error::Geometry`] as [`System::restore`]; whatever `watch` and
+    /// `finished` return.
     fn solve(
         &self,
         system: &mut System<D>,
@@ -218,7 +222,8 @@ impl VelocityVerlet {
         }
     }
 
-    /// What follows from the stretches that the fitted law covers: bounds of the critical time step and of the energy.
+    /// What follows from the stretches that the fitted law covers: bounds of the critical time step and of
+    /// the energy.
     pub(super) fn cover<const D: usize>(&self, system: &System<D>, state: &mut State<D>) {
         let (law, modulus) = (system.material.range(state.stretches.fitted), system.material.bond_law().1);
         let motion = &mut state.motion;

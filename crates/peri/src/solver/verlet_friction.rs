@@ -1,8 +1,8 @@
 //! Friction and rigid planes in a step of velocity Verlet.
 //!
-//! Friction reads the half-step velocities of both sides, so that it has a pass of its own between the forces and the second half of the
-//! kick: no work item changes a velocity that another one reads. Its work is Σ ½(force before + force after)·Δu like all
-//! others, so that the energies balance to O(Δt²).
+//! Friction reads the half-step velocities of both sides, so that it has a pass of its own between the forces
+//! and the second half of the kick: no work item changes a velocity that another one reads. Its work is Σ
+//! ½(force before + force after)·Δu like all others, so that the energies balance to O(Δt²).
 
 use super::state::State;
 use super::system::System;
@@ -11,8 +11,9 @@ use crate::field::{Field, chunk_range};
 use polycore::numerics::ordered_sum;
 use rayon::prelude::*;
 
-/// Computes friction for the half-step velocities, and adds it to the force; `old` are the forces of friction of the step before. Adds to
-/// the energy that friction has dissipated what it took in this step and does not store.
+/// Computes friction for the half-step velocities, and adds it to the force; `old` are the forces of friction
+/// of the step before. Adds to the energy that friction has dissipated what it took in this step and does not
+/// store.
 pub fn friction_pass<const D: usize>(
     system: &mut System<D>,
     state: &mut State<D>,

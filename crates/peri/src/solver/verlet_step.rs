@@ -1,5 +1,5 @@
-//! The passes of a step of velocity Verlet over all sites: half a kick and the drift; forces; the other half; and
-//! what a row of history sums.
+//! The passes of a step of velocity Verlet over all sites: half a kick and the drift; forces; the other half;
+//! and what a row of history sums.
 
 use super::load::Loads;
 use super::state::State;
@@ -47,8 +47,8 @@ impl Sums {
     }
 }
 
-/// Sites whose stretches are looked at together where bonds may break, a divisor of [`CHUNK`]: near a crack, few such parts hold bonds
-/// beyond what they bear, many work items do.
+/// Sites whose stretches are looked at together where bonds may break, a divisor of [`CHUNK`]: near a crack,
+/// few such parts hold bonds beyond what they bear, many work items do.
 const LOOK: usize = 256;
 
 /// A work item of two fields.
@@ -99,8 +99,8 @@ pub fn leap_pass<const D: usize>(
     parts.into_iter().fold(Sums::default(), Sums::add)
 }
 
-/// New forces and, where it `kicks`, the second half of the kick in the same pass: unless stretches are looked at first, or
-/// friction follows.
+/// New forces and, where it `kicks`, the second half of the kick in the same pass: unless stretches are
+/// looked at first, or friction follows.
 pub fn force_pass<const D: usize>(
     system: &mut System<D>,
     state: &mut State<D>,
@@ -150,8 +150,8 @@ pub fn kick_pass<const D: usize>(
     parts.into_iter().fold(Sums::default(), Sums::add)
 }
 
-/// Forces with loads, and the friction there is, of some sites and those they are computed with, or of all; bonds of others
-/// have not changed.
+/// Forces with loads, and the friction there is, of some sites and those they are computed with, or of all;
+/// bonds of others have not changed.
 pub fn refresh<const D: usize>(
     system: &mut System<D>,
     state: &mut State<D>,
@@ -313,7 +313,8 @@ fn free_kick(v: &mut [f64], f: &[f64], volumes: &[f64], push: f64) -> f64 {
     square.iter().sum()
 }
 
-/// The energy of material and contact, J; over all stretches that are fitted, so that the law is sampled once a fit.
+/// The energy of material and contact, J; over all stretches that are fitted, so that the law is sampled once
+/// a fit.
 pub fn stored<const D: usize>(system: &mut System<D>, state: &State<D>, observed: StretchRange) -> f64 {
     let [low, high] = state.stretches.fitted.map(|stretch| stretch * stretch - 1.0);
     let inside = observed.low >= low && observed.high <= high;

@@ -24,8 +24,9 @@ pub fn segment_fraction<const D: usize>(p: [f64; D], q: [f64; D], square: f64) -
     (leave - enter).max(0.0)
 }
 
-/// For each unit cell that a ball of `radius` about the origin touches: its offset and its share of the ball's volume.
-/// Exact in 2D; in 3D exact areas integrated by the midpoint rule over 64 slices a cell (error below 1e-4).
+/// For each unit cell that a ball of `radius` about the origin touches: its offset and its share of the
+/// ball's volume. Exact in 2D; in 3D exact areas integrated by the midpoint rule over 64 slices a cell (error
+/// below 1e-4).
 pub fn cell_fractions<const D: usize>(radius: f64) -> Vec<([i32; D], f64)> {
     let reach = (radius + 0.5).ceil() as i32;
     let side = (2 * reach + 1) as usize;

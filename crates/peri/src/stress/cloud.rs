@@ -49,7 +49,8 @@ fn in_balls<const D: usize>(
                     sum
                 })
                 .collect();
-            // what a lattice of the same mean spacing has in a whole ball: bodies thinner than that have no such ball
+            // what a lattice of the same mean spacing has in a whole ball: bodies thinner than that have no
+            // such ball
             let full = (Stencil::<D>::new(reach / bonds.spacing()).offsets.len() + 1) as f64;
             let full = full * bonds.spacing().powi(D as i32) * bonds.thickness();
             inside.into_iter().map(|v| whole * v / full).collect()
@@ -64,7 +65,8 @@ fn in_balls<const D: usize>(
         let mut add = |own: usize, weight_of: &dyn Fn([f64; D], [f64; D], usize) -> f64| {
             bonds.neighbours(own, &mut |bond| {
                 let p = std::array::from_fn(|d| points[own][d] - here[d]);
-                // not p + ξ: seen from the other end, both must be the same numbers or ties are counted twice or never
+                // not p + ξ: seen from the other end, both must be the same numbers or ties are counted twice
+                // or never
                 let q = std::array::from_fn(|d| points[bond.site][d] - here[d]);
                 let weight = weight_of(p, q, bond.site);
                 if weight > 0.0 {
@@ -117,7 +119,8 @@ fn moment<const D: usize>(
     std::array::from_fn(|a| std::array::from_fn(|b| scale * (bond.bond[a] + eta[a]) * bond.bond[b]))
 }
 
-/// The measures whose weights sum to 1: P_p = Σ f V_I V_J ⊗ ξ B_p/(Σ_q V_q B_q) over the bonds, B_p the bond function in p's window.
+/// The measures whose weights sum to 1: P_p = Σ f V_I V_J ⊗ ξ B_p/(Σ_q V_q B_q) over the bonds, B_p the bond
+/// function in p's window.
 struct Shares<'a, const D: usize> {
     bonds: &'a CloudBonds<D>,
     state: &'a Loaded<'a, D>,
@@ -136,7 +139,8 @@ struct Around<const D: usize> {
 }
 
 impl<const D: usize> Shares<'_, D> {
-    /// Bonds are shared out particle by particle; the shares are summed in the order of the particles, so that threads change no bit.
+    /// Bonds are shared out particle by particle; the shares are summed in the order of the particles, so
+    /// that threads change no bit.
     fn stress(&self) -> Vec<Tensor<D>> {
         /// Particles whose shares are held at once: about 150 kB each in a solid at m = 4.
         const HELD: usize = 128;

@@ -1,5 +1,5 @@
-//! The bonds of one type, shared out among the sites whose windows they cross: sums with fixed weights, a block of sites at
-//! a time.
+//! The bonds of one type, shared out among the sites whose windows they cross: sums with fixed weights, a
+//! block of sites at a time.
 
 use super::Tensor;
 use crate::bonds::TILE;
@@ -14,9 +14,10 @@ const BLOCK: usize = 64;
 /// Most taps whose vectors are loaded once for all of them.
 const RUN: usize = 6;
 
-/// Numbers a site: the force, and in solids 1 where both particles of the bond exist, which fills a vector of four. That
-/// is always aligned, wherever the bond begins; vectors of neighbouring sites cross cache lines at nearly every shift.
-/// In a plane a fourth number would be nothing but work, and a third is needed near surfaces only.
+/// Numbers a site: the force, and in solids 1 where both particles of the bond exist, which fills a vector of
+/// four. That is always aligned, wherever the bond begins; vectors of neighbouring sites cross cache lines at
+/// nearly every shift. In a plane a fourth number would be nothing but work, and a third is needed near
+/// surfaces only.
 pub const fn lanes<const D: usize>() -> usize {
     if D == 2 { 2 } else { 4 }
 }
@@ -34,7 +35,8 @@ pub struct Tap {
     pub weight: f64,
 }
 
-/// Taps of which each reads the vectors of the one before from the second on: what V + N − 1 vectors hold serves N taps.
+/// Taps of which each reads the vectors of the one before from the second on: what V + N − 1 vectors hold
+/// serves N taps.
 struct Run {
     /// The first tap's.
     shift: isize,
@@ -130,8 +132,8 @@ impl<const D: usize> Shared<D> {
         Self { sites, margin, forces, occupied: there, filled, shift: 0 }
     }
 
-    /// Takes the bonds to the sites `shift` farther on, whose forces `force` writes for a chunk from a site on, in the tiles
-    /// that have particles ([`lanes`] numbers a site).
+    /// Takes the bonds to the sites `shift` farther on, whose forces `force` writes for a chunk from a site
+    /// on, in the tiles that have particles ([`lanes`] numbers a site).
     pub fn set(&mut self, shift: isize, force: impl Fn(usize, &[bool], &mut [f64]) + Sync) {
         self.shift = shift;
         let lanes = lanes::<D>();
@@ -171,7 +173,8 @@ impl<const D: usize> Shared<D> {
 pub struct Shares<const D: usize> {
     /// Block by block, for each component of the edge [`lanes`] numbers a site.
     sums: Aligned,
-    /// 1 in sites whose averages are divided by the weights of the bonds whose two particles exist; and their tiles.
+    /// 1 in sites whose averages are divided by the weights of the bonds whose two particles exist; and their
+    /// tiles.
     completed: Vec<bool>,
     rim: Vec<bool>,
 }

@@ -1,5 +1,5 @@
-//! On a lattice the bond function depends on offsets only: each measure is, bond by bond of the stencil, a convolution
-//! of that bond's forces with fixed weights. The forces are the same for all measures.
+//! On a lattice the bond function depends on offsets only: each measure is, bond by bond of the stencil, a
+//! convolution of that bond's forces with fixed weights. The forces are the same for all measures.
 
 use super::convolution::{Shared, Shares, Tap, tiles};
 use super::pull::forces;
@@ -127,7 +127,8 @@ fn taps<const D: usize>(
     weights.into_iter().map(|(start, weight)| Tap { shift: bonds.shift(start), weight }).collect()
 }
 
-/// Where a bond begins that crosses the ball about a particle, and the part of it inside (as printed: ½ with both ends there).
+/// Where a bond begins that crosses the ball about a particle, and the part of it inside (as printed: ½ with
+/// both ends there).
 fn crossing<const D: usize>(ratio: f64, offset: [i32; D], measure: Measure) -> Vec<([i32; D], f64)> {
     let square = ratio * ratio;
     let reach = 2 * ratio.ceil() as i32;
@@ -148,7 +149,8 @@ fn crossing<const D: usize>(ratio: f64, offset: [i32; D], measure: Measure) -> V
         .collect()
 }
 
-/// The sites of particles so near a surface that bonds of their windows are missing, where existing ones make up for them.
+/// The sites of particles so near a surface that bonds of their windows are missing, where existing ones make
+/// up for them.
 fn rim<const D: usize>(bonds: &LatticeBonds<D>, state: &Loaded<D>, measure: Measure) -> Vec<u32> {
     let wanted = |site: usize| match measure {
         Measure::HardyBonds => true,

@@ -1,9 +1,10 @@
 //! Stress of a bonded body: first Piola–Kirchhoff P from bond forces, Cauchy σ = P Fᵀ/J.
 //!
-//! With the dual force f = 2t and the bond function B_IJ(X) = ∫₀¹ φ(X_I + α ξ_IJ − X) dα of a window φ (2.15), P = ½ Σ_I Σ_J
-//! f_IJ V_I V_J ⊗ ξ_IJ B_IJ over **all** bonds that cross the window (Eq. (2.14) with f for t); its divergence is the
-//! window's average of the force density. A uniform strain is exact if every bond's weights V B sum to 1 over the
-//! particles: those of a ball do not, those of a ball averaged over a particle's cell do.
+//! With the dual force f = 2t and the bond function B_IJ(X) = ∫₀¹ φ(X_I + α ξ_IJ − X) dα of a window φ
+//! (2.15), P = ½ Σ_I Σ_J f_IJ V_I V_J ⊗ ξ_IJ B_IJ over **all** bonds that cross the window (Eq. (2.14) with f
+//! for t); its divergence is the window's average of the force density. A uniform strain is exact if every
+//! bond's weights V B sum to 1 over the particles: those of a ball do not, those of a ball averaged over a
+//! particle's cell do.
 
 mod ball;
 mod cloud;
@@ -29,8 +30,8 @@ pub type Tensor<const D: usize> = [[f64; D]; D];
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Measure {
-    /// All bonds crossing the ball, by the part of them inside, averaged over the particle's cell: weights that sum to 1
-    /// for every type of bond; what is missing at surfaces as [`Missing`] says.
+    /// All bonds crossing the ball, by the part of them inside, averaged over the particle's cell: weights
+    /// that sum to 1 for every type of bond; what is missing at surfaces as [`Missing`] says.
     #[default]
     Hardy,
     /// [`Self::Hardy`] with [`Missing::Bonds`] everywhere.
@@ -43,18 +44,18 @@ pub enum Measure {
     Gaussian,
     /// [`Self::Hardy`] with the cubic spline as window.
     Spline,
-    /// Eq. (2.10) of Lehoucq and Silling with bond forces linear between particles: [`Self::Hardy`] with the particle's own
-    /// cell as window.
+    /// Eq. (2.10) of Lehoucq and Silling with bond forces linear between particles: [`Self::Hardy`] with the
+    /// particle's own cell as window.
     LehoucqSilling,
-    /// All bonds crossing the ball, by the part of them inside; ball volume inside the body. Fails the patch test by up to
-    /// 2.5 %.
+    /// All bonds crossing the ball, by the part of them inside; ball volume inside the body. Fails the patch
+    /// test by up to 2.5 %.
     BallShare,
     /// P = ½ Σ_J f ⊗ ξ V_J: cheap, equals the lattice's stiffness.
     OnePoint,
     /// Eq. (2.31) as printed: t for f, bonds with both ends in the ball only, the whole ball's volume.
     AsPublished,
-    /// P of the law itself at the mean deformation of a family, times its intact part: of solids in place of bond laws.
-    /// [`piola`] of bond forces gives NaN.
+    /// P of the law itself at the mean deformation of a family, times its intact part: of solids in place of
+    /// bond laws. [`piola`] of bond forces gives NaN.
     Constitutive,
 }
 
@@ -104,8 +105,9 @@ impl Measure {
 /// How the measures whose weights sum to 1 make up on a lattice for bonds that a surface leaves out.
 #[derive(Clone, Copy, Debug, Default)]
 pub enum Missing<'a> {
-    /// Every type of bond (direction and length) is divided by the weights of those whose two particles exist; a broken one
-    /// counts, with no force. A uniform strain is then exact up to the surface; where a body force acts it extrapolates.
+    /// Every type of bond (direction and length) is divided by the weights of those whose two particles
+    /// exist; a broken one counts, with no force. A uniform strain is then exact up to the surface; where a
+    /// body force acts it extrapolates.
     #[default]
     Bonds,
     /// All are divided by the share of the window that the body's cells cover.
@@ -132,7 +134,8 @@ pub enum BallVolume {
     /// The ball's volume times the share of its particles that exist.
     #[default]
     Particles,
-    /// The part of the ball that the particles' cells cover (lattices; a cloud has no cells and takes `Particles`).
+    /// The part of the ball that the particles' cells cover (lattices; a cloud has no cells and takes
+    /// `Particles`).
     Cells,
     /// The whole ball.
     Whole,
@@ -155,8 +158,8 @@ pub struct Loaded<'a, const D: usize> {
 pub struct Measured<const D: usize> {
     /// First Piola–Kirchhoff stress, in the order of [`BodyGeometry::particles`], Pa.
     pub piola: Vec<Tensor<D>>,
-    /// What this measure alone would have taken. On a lattice that includes the forces of all bonds, which are computed
-    /// once for all measures: together they took less than the sum of these seconds.
+    /// What this measure alone would have taken. On a lattice that includes the forces of all bonds, which
+    /// are computed once for all measures: together they took less than the sum of these seconds.
     pub seconds: f64,
 }
 
@@ -193,7 +196,8 @@ pub fn piola<const D: usize>(
     }
 }
 
-/// First Piola–Kirchhoff stress of every particle (in the order of [`BodyGeometry::particles`]), Pa, on a lattice.
+/// First Piola–Kirchhoff stress of every particle (in the order of [`BodyGeometry::particles`]), Pa, on a
+/// lattice.
 pub fn piola_on_lattice<const D: usize>(
     bonds: &LatticeBonds<D>,
     state: &Loaded<D>,
@@ -206,12 +210,13 @@ pub fn piola_on_lattice<const D: usize>(
     lattice::piolas(bonds, state, &[measure], ball).swap_remove(0).piola
 }
 
-/// First Piola–Kirchhoff stress of every particle (in the order of [`BodyGeometry::particles`]), Pa, in a cloud.
+/// First Piola–Kirchhoff stress of every particle (in the order of [`BodyGeometry::particles`]), Pa, in a
+/// cloud.
 ///
-/// A cloud has neither types of bonds nor cells: a measure whose weights sum to 1 shares every bond among the particles whose
-/// windows it crosses, by volume × bond function, so that the sum of P V is that of f ⊗ ξ over all bonds;
-/// [`Loaded::missing`] means nothing. Measures that need a lattice ([`Measure::needs_lattice`]) are taken as
-/// [`Measure::Hardy`]; scenes refuse them.
+/// A cloud has neither types of bonds nor cells: a measure whose weights sum to 1 shares every bond among the
+/// particles whose windows it crosses, by volume × bond function, so that the sum of P V is that of f ⊗ ξ
+/// over all bonds; [`Loaded::missing`] means nothing. Measures that need a lattice
+/// ([`Measure::needs_lattice`]) are taken as [`Measure::Hardy`]; scenes refuse them.
 pub fn piola_in_cloud<const D: usize>(
     bonds: &CloudBonds<D>,
     state: &Loaded<D>,

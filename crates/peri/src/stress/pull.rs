@@ -9,8 +9,8 @@ use pulp::{Arch, Simd, WithSimd};
 /// Vectors at a time: those of a tile where they are widest.
 const VECTORS: usize = 2;
 
-/// f V_I V_J, N, of bond `k` from the sites of a chunk on, in tiles that are `filled`; zero where it is not intact. `out` has
-/// [`lanes`] numbers a site.
+/// f V_I V_J, N, of bond `k` from the sites of a chunk on, in tiles that are `filled`; zero where it is not
+/// intact. `out` has [`lanes`] numbers a site.
 pub fn forces<const D: usize>(
     bonds: &LatticeBonds<D>,
     state: &Loaded<D>,
@@ -86,7 +86,8 @@ impl<const D: usize> WithSimd for Chunk<'_, D> {
     }
 }
 
-/// Vectors from a number on. A function of arrays in place of the loop would not become part of code for vectors.
+/// Vectors from a number on. A function of arrays in place of the loop would not become part of code for
+/// vectors.
 #[inline(always)]
 fn vectors<S: Simd>(simd: S, numbers: &[f64], from: usize) -> [S::f64s; VECTORS] {
     let vectors = &S::as_simd_f64s(&numbers[from..from + VECTORS * S::F64_LANES]).0[..VECTORS];

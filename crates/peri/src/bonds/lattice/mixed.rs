@@ -1,7 +1,7 @@
 //! Forces in mixed precision: bonds in single precision, the sums of their forces in double precision.
 //!
-//! Kernels read displacements over the spacing, rounded to 24 bits: the stretch of a bond is wrong by about 6e-8 of the displacement
-//! over the bond's length. All else of a body is in double precision.
+//! Kernels read displacements over the spacing, rounded to 24 bits: the stretch of a bond is wrong by about
+//! 6e-8 of the displacement over the bond's length. All else of a body is in double precision.
 
 use super::LatticeBonds;
 use crate::bonds::BondForces;
@@ -50,9 +50,10 @@ impl<const D: usize> Mixed<D> {
 }
 
 impl<const D: usize> LatticeBonds<D> {
-    /// Has [`BondForces::force`] evaluate bonds in single precision and sum their forces in double precision, from the next
-    /// [`BondForces::set_law`] on: forces of the displacement last given to [`crate::bonds::BondForces::prepare`]. A law that single precision misses by more
-    /// than 1e-5 ([`KernelFit::single_error`]) stays in double precision.
+    /// Has [`BondForces::force`] evaluate bonds in single precision and sum their forces in double precision,
+    /// from the next [`BondForces::set_law`] on: forces of the displacement last given to
+    /// [`crate::bonds::BondForces::prepare`]. A law that single precision misses by more than 1e-5
+    /// ([`KernelFit::single_error`]) stays in double precision.
     pub fn set_mixed(&mut self) {
         let displacement = std::array::from_fn(|_| vec![0.0; self.sites]);
         let mut mixed = Mixed { displacement, factors: None, kernel: None };
@@ -62,8 +63,9 @@ impl<const D: usize> LatticeBonds<D> {
         self.mixed = Some(mixed);
     }
 
-    /// Root mean square of what forces in mixed precision differ by from those in double precision, over that of the latter, in the
-    /// displacement last given to [`crate::bonds::BondForces::prepare`]; `None` without mixed precision.
+    /// Root mean square of what forces in mixed precision differ by from those in double precision, over that
+    /// of the latter, in the displacement last given to [`crate::bonds::BondForces::prepare`]; `None` without
+    /// mixed precision.
     pub fn mixed_error(&self, displacement: &Field<D>) -> Option<f64> {
         self.mixed.as_ref()?;
         let squares = |chunk: usize| {

@@ -13,9 +13,9 @@ pub struct Factor {
 }
 
 impl Factor {
-    /// Factors the matrix with `entries` in the places of `pattern`, in the order of elimination that its rows are in;
-    /// goes on from `old` where the pattern has not changed. `None` where the matrix is not positive definite to
-    /// double precision, or too large for the memory.
+    /// Factors the matrix with `entries` in the places of `pattern`, in the order of elimination that its
+    /// rows are in; goes on from `old` where the pattern has not changed. `None` where the matrix is not
+    /// positive definite to double precision, or too large for the memory.
     pub fn new(pattern: Pattern, entries: &[f64], old: Option<Self>) -> Option<Self> {
         let mut factor = match old {
             Some(old) if *old.cholesky.pattern() == pattern => old,

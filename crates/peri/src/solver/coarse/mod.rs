@@ -1,5 +1,5 @@
-//! The coarse level of a two-level preconditioner: P A_c⁻¹ Pᵀ with P the hat functions of [`space`], A_c their stiffness
-//! of [`stiffness`], factored by [`factor`].
+//! The coarse level of a two-level preconditioner: P A_c⁻¹ Pᵀ with P the hat functions of [`space`], A_c
+//! their stiffness of [`stiffness`], factored by [`factor`].
 
 mod factor;
 mod space;
@@ -21,8 +21,8 @@ use space::{CORNERS, NONE, Space};
 use stiffness::{Assembly, ElementMatrix};
 use transfer::{Prolong, Restrict};
 
-/// Stiffness against rigid motion over that against the longest wave of the body: pieces that float free, and those that
-/// turn about one bond, have none of their own.
+/// Stiffness against rigid motion over that against the longest wave of the body: pieces that float free, and
+/// those that turn about one bond, have none of their own.
 const SHIFT: f64 = 0.01;
 /// Least diagonal entry over the mean one.
 const LEAST_DIAGONAL: f64 = 1e-9;
@@ -37,7 +37,8 @@ pub struct Body<'a, const D: usize> {
     pub loads: &'a Loads<D>,
     /// Where the body is.
     pub displacement: &'a Field<D>,
-    /// The law; kθ, N/m⁶, and λ of the volume in addition to that of bonds, Pa; the stretches that the law is fitted for.
+    /// The law; kθ, N/m⁶, and λ of the volume in addition to that of bonds, Pa; the stretches that the law is
+    /// fitted for.
     pub law: (&'a dyn BondPotential, [f64; 2], [f64; 2]),
     /// Stiffness density of each site, N/m⁵, which holds what is constrained.
     pub springs: &'a [f64],
@@ -72,8 +73,8 @@ pub struct Coarse<const D: usize> {
 }
 
 impl<const D: usize> Coarse<D> {
-    /// Functions with cells of about `edge` (m), `most` degrees of freedom; keeps the analysis of `old` where it can.
-    /// `None` where the body is too small or too broken for a coarse level.
+    /// Functions with cells of about `edge` (m), `most` degrees of freedom; keeps the analysis of `old` where
+    /// it can. `None` where the body is too small or too broken for a coarse level.
     pub fn new(body: &Body<D>, edge: f64, most: usize, old: Option<Self>) -> Option<Self> {
         // a lattice's particle with every bond has neighbours on all sides; a cloud's may still be at a gap
         let whole = if body.bonds.whole_family().is_some() { body.survey.most } else { u32::MAX };

@@ -1,7 +1,9 @@
-//! A few smooth displacement fields for a whole body: multilinear hats on a background grid, split where the body is.
+//! A few smooth displacement fields for a whole body: multilinear hats on a background grid, split where the
+//! body is.
 //!
-//! The hat of a node is cut into one function for each part of the body that hangs together by intact bonds within the
-//! hat's support, so that no function moves both flanks of a crack, or a fragment with what it has left.
+//! The hat of a node is cut into one function for each part of the body that hangs together by intact bonds
+//! within the hat's support, so that no function moves both flanks of a crack, or a fragment with what it has
+//! left.
 
 use crate::bonds::BodyGeometry;
 use crate::field::Field;
@@ -25,7 +27,8 @@ pub struct Element {
     pub members: [usize; 2],
 }
 
-/// The functions, and the particles they move: by their sites, and by their numbers after [`Space::renumber`].
+/// The functions, and the particles they move: by their sites, and by their numbers after
+/// [`Space::renumber`].
 pub struct Space<const D: usize> {
     /// Edges of a cell, m.
     pub edge: [f64; D],
@@ -153,8 +156,9 @@ struct Split {
 }
 
 impl<const D: usize> Space<D> {
-    /// Cells of about `edge`, larger ones if there would be more than `most` functions; `None` where even that does not help.
-    /// `bonded` has the number of bonds of each site, `whole` that from which on nothing is missing around a particle.
+    /// Cells of about `edge`, larger ones if there would be more than `most` functions; `None` where even
+    /// that does not help. `bonded` has the number of bonds of each site, `whole` that from which on nothing
+    /// is missing around a particle.
     pub fn new(
         bonds: &dyn BodyGeometry<D>,
         bonded: &[u32],
@@ -231,8 +235,8 @@ impl<const D: usize> Space<D> {
         space
     }
 
-    /// Names particles by their numbers instead of their sites, and orders coordinates as [`Self::members`]; the place of each particle
-    /// there.
+    /// Names particles by their numbers instead of their sites, and orders coordinates as [`Self::members`];
+    /// the place of each particle there.
     pub fn renumber(&mut self, particles: &[u32]) -> Vec<u32> {
         let mut number = vec![NONE; self.element_of.len()];
         particles.iter().enumerate().for_each(|(index, &site)| number[site as usize] = index as u32);
@@ -288,8 +292,8 @@ impl<const D: usize> Space<D> {
     }
 }
 
-/// The parts of a window that hang together by bonds within it, numbered by their first site; `None` for one part.
-/// `place` holds [`NONE`] for every site, before and after.
+/// The parts of a window that hang together by bonds within it, numbered by their first site; `None` for one
+/// part. `place` holds [`NONE`] for every site, before and after.
 fn split<const D: usize>(
     bonds: &dyn BodyGeometry<D>,
     mut window: Vec<u32>,

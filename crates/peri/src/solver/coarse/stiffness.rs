@@ -1,6 +1,7 @@
 //! Stiffness of the body as the coarse functions see it: its particles as quadrature points of
-//! Σ_I V_I ∇φ_a : C_I : ∇φ_b, C_I = Σ_J kθ w V_J/|ξ| T ⊗ ξ ⊗ ξ, with T = t′ m⊗m + (t/λ)(1 − m⊗m) the tangent of a bond
-//! of direction m; the Hessian of the bonds' energy where the functions are linear within a horizon.
+//! Σ_I V_I ∇φ_a : C_I : ∇φ_b, C_I = Σ_J kθ w V_J/|ξ| T ⊗ ξ ⊗ ξ, with T = t′ m⊗m + (t/λ)(1 − m⊗m) the tangent
+//! of a bond of direction m; the Hessian of the bonds' energy where the functions are linear within a
+//! horizon.
 
 use super::space::{CORNERS, Element, Space};
 use crate::bonds::{BodyGeometry, Bonds};
@@ -16,8 +17,9 @@ const PAIRS: usize = CORNERS * (CORNERS + 1) / 2;
 const NODES: usize = 1024;
 /// Least tangent of a bond, over that at rest: a matrix of soft bonds must stay positive definite.
 const LEAST: f64 = 0.05;
-/// Part of the stiffness of its particles that the empty part of a cell has (the finite cell method of Parvizian, Düster &
-/// Rank 2007, doi:10.1007/s00466-007-0173-y): a few particles in a cell do not hold all its functions.
+/// Part of the stiffness of its particles that the empty part of a cell has (the finite cell method of
+/// Parvizian, Düster & Rank 2007, doi:10.1007/s00466-007-0173-y): a few particles in a cell do not hold all
+/// its functions.
 const FICTITIOUS: f64 = 0.1;
 /// Particles of an element whose C is computed for all that have every bond.
 const SAMPLES: usize = 4;
@@ -206,7 +208,8 @@ impl<'a, const D: usize> Assembly<'a, D> {
         self.lattice && self.survey.bonded[site] == self.survey.most
     }
 
-    /// C that stands for the particles of an element that have every bond: that at rest, or the mean of a few.
+    /// C that stands for the particles of an element that have every bond: that at rest, or the mean of a
+    /// few.
     fn shared(&self, members: &[u32]) -> Option<Tangent> {
         if self.interior.is_some() {
             return self.interior;
@@ -319,8 +322,8 @@ fn contract<const D: usize>(matrix: &mut ElementMatrix, tangent: &Tangent, produ
     }
 }
 
-/// matrix += λV ∂_iφ_a ∂_jφ_b, in full: a coarse level that takes less than the body's own stiffness, as by one point a cell, makes
-/// solutions slower than none (K/μ = 1000: 809 iterations for 263; in full 189).
+/// matrix += λV ∂_iφ_a ∂_jφ_b, in full: a coarse level that takes less than the body's own stiffness, as by
+/// one point a cell, makes solutions slower than none (K/μ = 1000: 809 iterations for 263; in full 189).
 fn add_volumetric<const D: usize>(matrix: &mut ElementMatrix, stiffness: f64, slopes: &[[f64; D]; CORNERS]) {
     let mut at = 0;
     for a in 0..1 << D {
