@@ -1,4 +1,4 @@
-//! The integrals over the horizon of Appendix A, by quadrature from their integrands.
+//! Integrals over the horizon of Appendix A, by quadrature of their integrands.
 //!
 //! Unit disk and unit ball, of unit thickness. Single-point: ∫ ξ⊗ξ⊗ξ⊗ξ/|ξ|³ dV over the horizon of a point,
 //! which is a coefficient times δδ + δδ + δδ: (A.19) has tπR³/12, (A.39) πR⁴/15. Double: the same between two
@@ -24,8 +24,8 @@ fn around(f: impl Fn(f64) -> f64) -> f64 {
     (0..ANGLES).map(|k| f((k as f64 + 0.5) * step)).sum::<f64>() * step
 }
 
-/// ∫ ξᵢξⱼξₖξₗ/|ξ|³ dV of (1111) and (1122) over the disk and the ball, ∬ |ξ| dV dV over both, and the trace
-/// of what is published over them.
+/// Computes ∫ ξᵢξⱼξₖξₗ/|ξ|³ dV of (1111) and (1122) over the disk and the ball, ∬ |ξ| dV dV over both, and
+/// the trace of the published values.
 pub fn all() -> [f64; 8] {
     // ξᵢξⱼξₖξₗ/|ξ|³ of (1111) and (1122), ξ = r(c, s)
     let disk = |power: [i32; 2]| {
@@ -71,8 +71,8 @@ pub fn all() -> [f64; 8] {
 mod tests {
     use super::*;
 
-    /// Closed forms: δδ + δδ + δδ is 3 for (1111) and 1 for (1122); 128/45π is the mean distance of two
-    /// points in a unit disk, 36/35 in a unit ball (Santaló 1976).
+    /// Compares with closed forms: δδ + δδ + δδ is 3 for (1111) and 1 for (1122); 128/45π is the mean
+    /// distance of two points in a unit disk, 36/35 in a unit ball (Santaló 1976).
     #[test]
     fn closed_forms() {
         let expected = [

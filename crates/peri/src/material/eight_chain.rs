@@ -1,4 +1,4 @@
-//! Rubber as a network of Langevin chains whose volume is kept by a pressure.
+//! Rubber as a network of Langevin chains with a pressure that conserves the volume.
 
 use super::crushed::{CRUSHED, inverse_square, logarithm, logarithm_slopes};
 use super::point_law::{Deformation, PointLaw, PointStress};
@@ -20,22 +20,22 @@ pub struct EightChain<const D: usize> {
     modulus: f64,
     links: f64,
     bulk: f64,
-    /// κ, Pa; infinite of an incompressible sheet.
+    /// κ, Pa; infinite for an incompressible sheet.
     volumetric: f64,
     /// β₁.
     rest: f64,
     filter: bool,
 }
 
-/// Relative extension beyond which β grows linearly: a chain that a load step stretches too far has a force
-/// nevertheless.
+/// Relative extension beyond which β grows linearly, so that a chain overstretched by a load step still has a
+/// force.
 pub(super) const LINEAR: f64 = 0.995;
-/// Excess of I₁ below which the energy is an integral of μ, which does not cancel.
+/// Excess of I₁ below which the energy is integrated from μ, without cancellation.
 const SMALL: f64 = 0.05;
 
 impl<const D: usize> EightChain<D> {
-    /// Of a shear modulus μ₀ > 0 in Pa and n > 1 links a chain. The bulk modulus K in Pa is above
-    /// 2μ₀/3 + 2 dμ/dI₁ at rest, or infinite in plane stress.
+    /// Creates the law of a shear modulus μ₀ > 0 in Pa and n > 1 links a chain. The bulk modulus K in Pa is
+    /// above 2μ₀/3 + 2 dμ/dI₁ at rest, or infinite in plane stress.
     ///
     /// # Errors
     /// [`Error::Parameter`]; [`Error::Geometry`] for a space of another dimension.
@@ -66,11 +66,11 @@ impl<const D: usize> EightChain<D> {
         Ok(law)
     }
 
-    /// The same with U(bJ), b the average over nearest neighbours of a lattice: pressures of large bulk
-    /// moduli become smoother at corners.
+    /// Uses U(bJ), b the average over nearest neighbours of a lattice: pressures of large bulk moduli become
+    /// smoother at corners.
     ///
     /// # Errors
-    /// [`Error::Parameter`] in plane stress, whose thickness gives way.
+    /// [`Error::Parameter`] in plane stress, whose thickness adapts.
     pub fn filtered(mut self) -> Result<Self, Error> {
         if self.space == Space::PlaneStress {
             let allowed = "solids and plane strain".into();
@@ -132,7 +132,7 @@ impl<const D: usize> EightChain<D> {
         network * self.links * (free(x) - free(1.0 / root))
     }
 
-    /// λ₃² and what W_J and W_JJ need of it, in plane stress.
+    /// λ₃² and its terms in W_J and W_JJ, in plane stress.
     fn thickness(&self, excess: f64, change: f64) -> Thickness {
         let jacobian = 1.0 + change;
         if self.volumetric.is_infinite() {
@@ -206,7 +206,7 @@ impl<const D: usize> EightChain<D> {
     }
 }
 
-/// J below which the thickness is that at this J, of a sheet with finite K.
+/// J below which the thickness is that at this J, for a sheet with finite K.
 const THINNEST: f64 = 0.05;
 
 struct Thickness {
