@@ -214,7 +214,7 @@ struct Thickness {
     third: f64,
     /// Jλ₃ − 1.
     change: f64,
-    /// λ₃², and of an incompressible sheet its derivatives by J.
+    /// λ₃², and for an incompressible sheet its derivatives by J.
     square: [f64; 3],
 }
 
@@ -229,7 +229,7 @@ impl<const D: usize> PointLaw<D> for EightChain<D> {
         if self.volumetric.is_infinite() {
             return chains;
         }
-        // below the thinnest, along the slope there
+        // below the thinnest state, continued along the slope there
         let slope = self.volume(found.change)[0] * found.square[0].sqrt();
         chains + self.volume_energy(found.change) + slope * (1.0 + change - THINNEST).min(0.0)
     }
