@@ -1,4 +1,4 @@
-//! Both passes of materials whose forces are linear in a bond, on clouds: moments of family displacements,
+//! The two passes of materials whose forces are linear in a bond, on clouds: moments of family displacements,
 //! and forces.
 //!
 //! The data of a neighbour lie together in four lanes, so that plain loops become vector instructions.

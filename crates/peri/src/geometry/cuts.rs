@@ -17,7 +17,7 @@ impl Cut<2> {
 }
 
 impl<const D: usize> Cut<D> {
-    /// Both ends in 2D, all four corners in 3D.
+    /// Corners: two ends in 2D, four corners in 3D.
     pub fn corners(&self) -> Vec<[f64; D]> {
         self.edges.iter().take(D - 1).fold(vec![self.corner], |corners, edge| {
             let moved = corners.iter().map(|c| std::array::from_fn(|d| c[d] + edge[d]));

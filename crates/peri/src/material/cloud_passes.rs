@@ -1,4 +1,4 @@
-//! Both passes of a solid on a cloud, by the kernels of [`crate::bonds`].
+//! The two passes of a solid on a cloud, by the kernels of [`crate::bonds`].
 
 use super::family::Bond;
 use super::point::Point;

@@ -8,7 +8,7 @@ use crate::potential::{BondPotential, LinearBond, StretchRange};
 use polycore::numerics::ordered_sum;
 use rayon::prelude::*;
 
-/// Both passes of a material over a whole body, for materials with something faster than plain loops over
+/// The two passes of a material over a whole body, for materials with something faster than plain loops over
 /// bonds. States and forces must equal those of [`Material::prepare`] and [`Material::force`] except for
 /// rounding.
 pub trait Passes<M: Material<D> + ?Sized, const D: usize>: Send + Sync {

@@ -1,4 +1,4 @@
-//! Both passes of a solid on a lattice, by the kernels of [`crate::bonds`], and parts shared with clouds.
+//! The two passes of a solid on a lattice, by the kernels of [`crate::bonds`], and parts shared with clouds.
 
 use super::Body;
 use super::family::Family;

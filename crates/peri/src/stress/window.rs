@@ -3,7 +3,7 @@
 use super::{Measure, segment_fraction};
 use rayon::prelude::*;
 
-/// Standard deviation of the Gaussian window over its radius, at which it is cut off.
+/// Standard deviation of the Gaussian window over its cut-off radius.
 const DEVIATION: f64 = 1.0 / 3.0;
 
 /// Shape of a localisation function.
@@ -20,7 +20,7 @@ pub enum Window {
 }
 
 impl Window {
-    /// The window of a measure that is a sum over bonds with a bond function.
+    /// Window of a measure that is a sum over bonds with a bond function.
     pub fn of(measure: Measure) -> Self {
         match measure {
             Measure::Gaussian => Self::Gaussian,
@@ -51,17 +51,17 @@ impl Window {
 /// A window averaged over a cell of edge 1, tabulated on a grid finer than the cells. Its values at points
 /// one cell apart have the same sum wherever the points lie: a partition of unity over the lattice.
 pub struct Averaged<const D: usize> {
-    /// Intervals a cell.
+    /// Intervals per cell.
     fine: usize,
     /// Cells from the centre to the table's ends.
     reach: usize,
-    /// Points a cell at which bond functions look, along the longest axis.
+    /// Points per cell at which bond functions are evaluated, along the longest axis.
     steps: usize,
     values: Vec<f64>,
 }
 
 impl<const D: usize> Averaged<D> {
-    /// The average of a window of `radius` cells.
+    /// Averages a window of `radius` cells.
     pub fn new(window: Window, radius: f64) -> Self {
         let radius = if window == Window::Cell { 1.0 } else { radius };
         let reach = (radius + 0.5).ceil() as usize + 1;
@@ -81,7 +81,7 @@ impl<const D: usize> Averaged<D> {
         2 * self.reach * self.fine
     }
 
-    /// The averaged window at a point, linear between nodes.
+    /// Averaged window at a point, linear between nodes.
     pub fn at(&self, x: [f64; D]) -> f64 {
         let side = self.side();
         let (mut base, mut part) = (0, [0.0; D]);
@@ -106,7 +106,7 @@ impl<const D: usize> Averaged<D> {
             .sum()
     }
 
-    /// Offsets p from which the bond p → p + `offset` meets the window, and the bond function B(p) = ∫₀¹
+    /// Offsets p from which the bond p → p + `offset` meets the window, with the bond function B(p) = ∫₀¹
     /// φ(p + α·offset) dα there, over its sum: Σ B = 1.
     pub fn bond_function(&self, offset: [i32; D]) -> Vec<([i32; D], f64)> {
         let mut found = self.raw_bond_function(offset);
@@ -114,7 +114,7 @@ impl<const D: usize> Averaged<D> {
         found
     }
 
-    /// The same as it is: over the window's value at the centre.
+    /// Bond function over the window's value at the centre, not normalised.
     fn raw_bond_function(&self, offset: [i32; D]) -> Vec<([i32; D], f64)> {
         let reach = self.reach as i32;
         let low = offset.map(|o| -reach - o.max(0));
@@ -139,7 +139,7 @@ impl<const D: usize> Averaged<D> {
             .collect()
     }
 
-    /// The share of the window's volume in each cell around the centre.
+    /// Share of the window's volume in each cell around the centre.
     pub fn cells(&self) -> Vec<([i32; D], f64)> {
         let (reach, fine) = (self.reach as i32, self.fine);
         let across = (2 * reach + 1) as usize;
@@ -162,14 +162,14 @@ impl<const D: usize> Averaged<D> {
     }
 }
 
-/// The mean of a window of `radius` about the origin over the segment from `p` to `q`, Eq. (2.15), over its
-/// value at the centre.
+/// Mean of a window of `radius` about the origin over the segment from `p` to `q`, Eq. (2.15), over its value
+/// at the centre.
 pub fn bond_function<const D: usize>(window: Window, p: [f64; D], q: [f64; D], radius: f64) -> f64 {
     let inside = segment_fraction(p, q, radius * radius);
     if window == Window::Ball || inside == 0.0 {
         return inside;
     }
-    // the part inside the ball lies about the point nearest its centre, cut off by the ends
+    // the part inside the ball is symmetric about the point nearest its centre, cut off by the ends
     let edge: [f64; D] = std::array::from_fn(|d| q[d] - p[d]);
     let dot = |a: [f64; D], b: [f64; D]| (0..D).map(|d| a[d] * b[d]).sum::<f64>();
     let (length, nearest) = (dot(edge, edge), -dot(p, edge) / dot(edge, edge));
@@ -220,8 +220,8 @@ pub fn normalise<T>(weights: &mut [(T, f64)]) {
     }
 }
 
-/// The average of `fine` samples along every axis. Samples lie between nodes: the cell about node i holds
-/// those from i − fine/2 on; nothing lies beyond the ends.
+/// Averages `fine` samples along every axis. Samples lie between nodes: the cell about node i holds those
+/// from i − fine/2 on; zero beyond the ends.
 fn averaged<const D: usize>(mut values: Vec<f64>, side: usize, fine: usize) -> Vec<f64> {
     for d in 0..D {
         let stride = side.pow(d as u32);
@@ -243,8 +243,8 @@ mod tests {
 
     const WINDOWS: [Window; 4] = [Window::Ball, Window::Gaussian, Window::Spline, Window::Cell];
 
-    /// Σ_p φ(p + x) over the lattice does not depend on x; without the average over the cell it does, by
-    /// percents.
+    /// Checks that Σ_p φ(p + x) over the lattice does not depend on x; without the average over the cell it
+    /// does, by several percent.
     fn partition<const D: usize>(ratio: f64) {
         let far = ratio as i32 + 3;
         let side = (2 * far + 1) as usize;
@@ -276,8 +276,8 @@ mod tests {
         }
     }
 
-    /// So every bond has the same sum of weights before it is divided: that of the window over the cells.
-    /// Solids of m = 3, 4 and 6, whose whole fields take long.
+    /// Every bond has the same sum of weights before it is divided: that of the window over the cells. Solids
+    /// of m = 3, 4 and 6, whose whole fields take long.
     #[test]
     fn weights_of_every_bond_sum_to_the_same() {
         for ratio in [3.015, 4.015, 6.015] {
@@ -298,8 +298,8 @@ mod tests {
         }
     }
 
-    /// Windows fall from their centre and vanish outside: (2.16), (2.17); along a bond their mean is that of
-    /// many points.
+    /// Windows decrease from their centre and vanish outside: (2.16), (2.17); their mean along a bond is that
+    /// of many points.
     #[test]
     fn shapes_and_means_along_bonds() {
         for window in WINDOWS {
