@@ -1,8 +1,10 @@
-//! An elastic block in motion: the problem that other peridynamics codes are timed on (`cargo xtask bench peri-peers`).
+//! An elastic block in motion: the problem that other peridynamics codes are timed on (`cargo xtask bench
+//! peri-peers`).
 //!
-//! A cube of the prototype microelastic material (18K/(πδ⁴) times the strain of a bond, Silling & Askari 2005,
-//! doi:10.1016/j.compstruc.2004.11.026), free on all sides, released at rest from a smooth displacement. The constants
-//! are those of LAMMPS' example `peri`, Parks et al. 2008, doi:10.1016/j.cpc.2008.06.011.
+//! A cube of the prototype microelastic material (18K/(πδ⁴) times the strain of a bond, Silling & Askari
+//! 2005, doi:10.1016/j.compstruc.2004.11.026), free on all sides, released at rest from a smooth
+//! displacement. The constants are those of LAMMPS' example `peri`, Parks et al. 2008,
+//! doi:10.1016/j.cpc.2008.06.011.
 
 use crate::Failure;
 use crate::kernel::RATIO;

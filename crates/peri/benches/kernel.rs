@@ -48,8 +48,8 @@ pub fn loaded<const D: usize>(
 /// A material at work, and its name.
 pub type Named<const D: usize> = (&'static str, Box<dyn Response<D>>);
 
-/// Solids with two passes, by name: chains of 25 links, and by correspondence neo-Hookean rubber, K/μ = 100, and a learnt law, a
-/// network of 209 weights that are random: its speed does not depend on them.
+/// Solids with two passes, by name: chains of 25 links, and by correspondence neo-Hookean rubber, K/μ = 100,
+/// and a learnt law, a network of 209 weights that are random: its speed does not depend on them.
 pub fn solids<const D: usize>(bonds: &dyn Bonds<D>) -> Result<[Named<D>; 3], Error> {
     let space = if D == 2 { Space::PlaneStrain } else { Space::Solid };
     let law =

@@ -1,8 +1,8 @@
 //! Ways to evaluate a bond law: error against time (`cargo xtask bench peri-laws`).
 //!
-//! Law `chain-offset`, n̄ = 720, D̂ = 1200, bond stretches l uniform in [0.5, 2.9442], the critical one of the thesis' DENT
-//! specimen. As in the kernels, what comes in is e = l² − 1 and what goes out q = t/l: tables need a square root. Error:
-//! the largest of q over its root mean square, against the law itself.
+//! Law `chain-offset`, n̄ = 720, D̂ = 1200, bond stretches l uniform in [0.5, 2.9442], the critical one of
+//! the thesis' DENT specimen. As in the kernels, what comes in is e = l² − 1 and what goes out q = t/l:
+//! tables need a square root. Error: the largest of q over its root mean square, against the law itself.
 
 use evidence::measurement::Measurement;
 use peri::Error;

@@ -1,4 +1,5 @@
-//! `cargo xtask bench peri`: bond evaluations per second, bytes per particle, and the machine's bandwidth beside them.
+//! `cargo xtask bench peri`: bond evaluations per second, bytes per particle, and the machine's bandwidth
+//! beside them.
 
 use clap::Parser;
 use evidence::measurement::{Measurement, print};

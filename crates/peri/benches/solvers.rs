@@ -1,7 +1,8 @@
 //! Quasi-static methods on one problem: error against work and run time (`cargo xtask bench peri-solvers`).
 //!
-//! The plate with a hole of `cases/ch2/plate-with-hole`, from rest to equilibrium in one load step. Error: the largest
-//! difference of displacements from the same lattice's equilibrium at a residual of 1e-11, over the root mean square.
+//! The plate with a hole of `cases/ch2/plate-with-hole`, from rest to equilibrium in one load step. Error:
+//! the largest difference of displacements from the same lattice's equilibrium at a residual of 1e-11, over
+//! the root mean square.
 
 use crate::RATIO;
 use evidence::measurement::Measurement;

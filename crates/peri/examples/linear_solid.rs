@@ -1,5 +1,5 @@
-//! A material of your own: the linear solid of ordinary state-based peridynamics, whose Poisson ratio is free.
-//! Silling et al. 2007, doi:10.1007/s10659-007-9125-1, in D dimensions (2: plane strain).
+//! A material of your own: the linear solid of ordinary state-based peridynamics, whose Poisson ratio is
+//! free. Silling et al. 2007, doi:10.1007/s10659-007-9125-1, in D dimensions (2: plane strain).
 //!
 //! ```sh
 //! cargo run --release --package peri --example linear_solid
@@ -12,8 +12,8 @@ use peri::material::{Bond, Family, Material, Property};
 use peri::solver::{Lbfgs, Loads, Method, State, Support, System};
 
 // ANCHOR: material
-/// W = ½K θ² + ½α Σ_J (e − θ|ξ|/D)² V_J with the bonds' extensions e = |ζ| − |ξ|, the weighted volume m = Σ_J |ξ|² V_J of the
-/// whole family, the dilatation θ = (D/m) Σ_J |ξ| e V_J and α = D(D + 2)μ/m.
+/// W = ½K θ² + ½α Σ_J (e − θ|ξ|/D)² V_J with the bonds' extensions e = |ζ| − |ξ|, the weighted volume m =
+/// Σ_J |ξ|² V_J of the whole family, the dilatation θ = (D/m) Σ_J |ξ| e V_J and α = D(D + 2)μ/m.
 #[derive(Clone)]
 pub struct LinearSolid {
     /// Bulk modulus K, Pa; in plane strain K₃ + μ/3. A number for all particles, or a field.
@@ -97,7 +97,8 @@ impl<const D: usize> Material<D> for LinearSolid {
 }
 // ANCHOR_END: material
 
-/// A strip of 60 × 16 particles in plane strain, pulled by 1 % with its sides free: −ε₂₂/ε₁₁ in the middle, from rows 6 apart.
+/// A strip of 60 × 16 particles in plane strain, pulled by 1 % with its sides free: −ε₂₂/ε₁₁ in the middle,
+/// from rows 6 apart.
 pub fn poisson_ratio(solid: LinearSolid) -> Result<f64, peri::Error> {
     let body = [Operation::Add(Shape::Box { min: [0.0; 2], max: [60.0, 16.0] })];
     let mut bonds = LatticeBonds::new(lattice(&body, 1.0, 1.0)?, 3.015, VolumeCorrection::None, &[])?;

@@ -1,5 +1,6 @@
-//! A rubber strip between two rigid plates, which bond laws cannot describe: it is stiff because its volume cannot change.
-//! Plane strain, eight-chain network; apparent modulus against Gent & Lindley's for thin bonded strips (1959, doi:10.1243/PIME_PROC_1959_173_022_02).
+//! A rubber strip between two rigid plates, which bond laws cannot describe: it is stiff because its volume
+//! cannot change. Plane strain, eight-chain network; apparent modulus against Gent & Lindley's for thin
+//! bonded strips (1959, doi:10.1243/PIME_PROC_1959_173_022_02).
 
 use peri::calibrate::Space;
 use peri::geometry::Shape;

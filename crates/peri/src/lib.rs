@@ -1,7 +1,8 @@
-//! Bond-based peridynamics of elastomers: chain-network bond laws, lattices without neighbour lists and clouds with
-//! them, adaptive dynamic relaxation, Hardy stress.
+//! Bond-based peridynamics of elastomers: chain-network bond laws, lattices without neighbour lists and
+//! clouds with them, adaptive dynamic relaxation, Hardy stress.
 //!
-//! The `peri` command line solves problems written as scenes (`program::scene`, feature `case`); the same from Rust:
+//! The `peri` command line solves problems written as scenes (`program::scene`, feature `case`); the same
+//! from Rust:
 //!
 //! ```
 //! use peri::geometry::Shape;
@@ -27,8 +28,8 @@
 //! # }
 //! ```
 //!
-//! The modules below are the parts of [`model`]. Use them directly for clouds of particles, surface corrections, materials
-//! and methods of your own.
+//! The modules below are the parts of [`model`]. Use them directly for clouds of particles, surface
+//! corrections, materials and methods of your own.
 
 pub mod bonds;
 pub mod calibrate;

@@ -1,4 +1,4 @@
-//! Surface of a body as face points, about one for each particle on it: where rigid planes touch.
+//! Surface of a body as face points, about one for each particle on it: rigid planes act there.
 
 use crate::bonds::{BodyGeometry, LatticeBonds};
 use crate::geometry::{Operation, Shape, bounds, cell_counts, inside, length};
@@ -11,11 +11,11 @@ const SIDE: f64 = 0.01;
 /// A point of the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Face<const D: usize> {
-    /// Reference place, m.
+    /// Reference position, m.
     pub place: [f64; D],
     /// Outward unit normal.
     pub normal: [f64; D],
-    /// Number of its patch.
+    /// Number of the face's patch.
     pub patch: u32,
 }
 
@@ -24,7 +24,8 @@ pub struct Face<const D: usize> {
 enum Patch<const D: usize> {
     /// Faces with normals along an axis.
     Flat { axis: usize, outward: f64 },
-    /// Part of a circle, a sphere, or a circular cylinder along `axis`; `outward` is −1 for the wall of a hole.
+    /// Part of a circle, a sphere, or a circular cylinder along `axis`; `outward` is −1 for the wall of a
+    /// hole.
     Round { centre: [f64; D], radius: f64, axis: Option<usize>, outward: f64 },
 }
 
@@ -34,7 +35,8 @@ impl<const D: usize> Patch<D> {
         std::array::from_fn(|d| if Some(d) == axis { 0.0 } else { point[d] - centre[d] })
     }
 
-    /// Distance along the surface between a face and the point of the surface above a particle, and depth of the particle, m.
+    /// Distance along the surface between a face and the point of the surface above a particle, and depth of
+    /// the particle, m.
     fn reach(&self, face: &Face<D>, point: [f64; D]) -> (f64, f64) {
         match *self {
             Self::Flat { axis, outward } => {
@@ -58,17 +60,18 @@ impl<const D: usize> Patch<D> {
     }
 }
 
-/// Face points and the patches that they belong to.
+/// Face points and their patches.
 #[derive(Clone, Debug, Default)]
 pub struct Surface<const D: usize> {
     faces: Vec<Face<D>>,
     patches: Vec<Patch<D>>,
-    /// Faces that only bound what lies below the others: the last ones.
+    /// Number of faces, at the end of the list, that only bound the region below the others.
     bounds: usize,
 }
 
 impl<const D: usize> Surface<D> {
-    /// Samples the boundary of shapes: flat sides above the columns of the lattice, round ones at equal arcs of about `spacing`, m.
+    /// Samples the boundary of shapes: flat sides above the columns of the lattice, round ones at equal arcs
+    /// of about `spacing`, m.
     pub fn of_shapes(operations: &[Operation<D>], spacing: f64) -> Self {
         let mut surface = Self { faces: Vec::new(), patches: Vec::new(), bounds: 0 };
         let Some((low, high)) = bounds(operations) else { return surface };
@@ -116,12 +119,13 @@ impl<const D: usize> Surface<D> {
         Self { faces, patches, bounds: 0 }
     }
 
-    /// Takes flat sides whose patches are those of [`Self::of_lattice`]: 2d and 2d + 1 for the normals along −d and d.
+    /// Collects flat sides whose patches are those of [`Self::of_lattice`]: 2d and 2d + 1 for the normals
+    /// along −d and d.
     pub(crate) fn of_sides(faces: Vec<Face<D>>) -> Self {
         Self { faces, patches: Self::axes(), bounds: 0 }
     }
 
-    /// With the faces of another surface of the same body on the other side of what lies below these.
+    /// Adds the faces of another surface of the same body, on the other side of the region below these.
     pub fn bounded_by(mut self, other: &Self) -> Self {
         let shift = self.patches.len() as u32;
         self.patches.extend(&other.patches);
@@ -131,7 +135,7 @@ impl<const D: usize> Surface<D> {
         self
     }
 
-    /// Returns true for a face, by its number, that only bounds what lies below the others.
+    /// Returns true for a face, by its number, that only bounds the region below the others.
     pub fn is_bound(&self, face: usize) -> bool {
         face + self.bounds >= self.faces.len()
     }
@@ -145,7 +149,8 @@ impl<const D: usize> Surface<D> {
         &self.faces
     }
 
-    /// Distance along the surface between a face and the point of the surface above a particle, and depth of the particle, m.
+    /// Distance along the surface between a face and the point of the surface above a particle, and depth of
+    /// the particle, m.
     pub fn reach(&self, face: &Face<D>, point: [f64; D]) -> (f64, f64) {
         self.patches[face.patch as usize].reach(face, point)
     }
@@ -201,7 +206,7 @@ impl<const D: usize> Surface<D> {
         }
     }
 
-    /// Adds `count` points of a ring, given as normal and place of each direction.
+    /// Adds `count` points of a ring, given by normal and position of each direction.
     fn ring(
         &mut self,
         patch: u32,
@@ -216,7 +221,7 @@ impl<const D: usize> Surface<D> {
         }
     }
 
-    /// Adds the points of both sides of a shape that are flat across an axis, above the columns of the lattice.
+    /// Adds the points of both flat sides of a shape across an axis, above the columns of the lattice.
     fn flat(&mut self, shape: &Shape<D>, axis: usize, ends: (f64, f64), outward: f64, columns: &Columns<D>) {
         let middle = 0.5 * (ends.0 + ends.1);
         for (end, sign) in [(ends.0, -outward), (ends.1, outward)] {

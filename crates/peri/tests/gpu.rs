@@ -45,8 +45,9 @@ fn damaged<const D: usize>(cells: [usize; D]) -> LatticeBonds<D> {
     Body { surface: None, ..Body::damaged(cells, 1e-3, 3.015) }.build().lattice
 }
 
-/// What rounding of displacements, of the law and of sums may make of a particle's force: with c = 2kθ w V/|ξ| and the rounding
-/// ε|ξ + η|(|u_I| + |u_J|) of E, of which q is a function, Σ_J c (|q| + |q′| |δE|/ε + |q|)|ζ|.
+/// What rounding of displacements, of the law and of sums may make of a particle's force: with c = 2kθ w
+/// V/|ξ| and the rounding ε|ξ + η|(|u_I| + |u_J|) of E, of which q is a function, Σ_J c (|q| + |q′| |δE|/ε
+/// + |q|)|ζ|.
 fn sizes<const D: usize>(bonds: &LatticeBonds<D>, law: &KernelFit, u: &Field<D>) -> Vec<f64> {
     let of = |site: u32| {
         let mut size = 0.0;
@@ -87,7 +88,8 @@ fn compare_forces<const D: usize>(device: &Device, cells: [usize; D]) {
             // a particle without bonds has neither
             worst = worst.max(if apart == 0.0 { 0.0 } else { apart / (size * device.precision().epsilon()) });
         }
-        // a bond's force is rounded in ten to fifty operations, each by up to ½ε, in directions that have nothing in common
+        // a bond's force is rounded in ten to fifty operations, each by up to ½ε, in directions that have
+        // nothing in common
         let name =
             format!("{D}D {} forces of {} in {:?}, in ε Σ|f|", law.name(), device.name(), device.precision());
         eprintln!("{name}: {worst:.2}");
@@ -103,8 +105,8 @@ fn gpu_forces_are_those_of_the_host() {
     }
 }
 
-/// A slit sheet or block that stretches evenly at first and whose ends go on to do so: bonds break beside slits and hole, on both
-/// sides the same.
+/// A slit sheet or block that stretches evenly at first and whose ends go on to do so: bonds break beside
+/// slits and hole, on both sides the same.
 fn compare_motion<const D: usize>(device: &Device, cells: [usize; D], critical: f64) {
     const STEPS: u64 = 60;
     let law = Law::ChainOffset.build(720.0, 1200.0, false).unwrap();
@@ -172,8 +174,8 @@ fn compare_motion<const D: usize>(device: &Device, cells: [usize; D], critical: 
         let (a, b) = (motion.displacement.get(site as usize), state.displacement.get(site as usize));
         apart = apart.max(norm::<D>(std::array::from_fn(|d| a[d] - b[d])));
     }
-    // every step rounds u and vΔt by ½ε of them, at random: ½ε√n of u each; four times that. The law on each side is within
-    // 1e-9 of the true one
+    // every step rounds u and vΔt by ½ε of them, at random: ½ε√n of u each; four times that. The law on each
+    // side is within 1e-9 of the true one
     let allowed = 4.0 * (STEPS as f64).sqrt() * device.precision().epsilon().max(1e-9) * reach;
     let name = format!("{D}D motion on {} in {:?}, m", device.name(), device.precision());
     let broken = state.fracture.broken;
@@ -282,7 +284,8 @@ fn gpu_bodies_beyond_the_memory() {
     if most > 1 << 25 {
         return evidence::skipped("a device with small buffers");
     }
-    // three sites a cell, with the empty ones on either side of the row: within the limit in single precision, beyond it in double
+    // three sites a cell, with the empty ones on either side of the row: within the limit in single
+    // precision, beyond it in double
     let cells = [most as usize / 2, 1];
     let row = Lattice { spacing: 1.0, origin: [0.5; 2], cells, occupied: vec![true; cells[0]], volume: 1.0 };
     let bonds = LatticeBonds::new(row, 1.0, VolumeCorrection::None, &[]).unwrap();

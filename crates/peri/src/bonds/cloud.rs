@@ -41,14 +41,14 @@ struct CloudLaw<const D: usize> {
     weights: Vec<f64>,
     /// 2kθ, times the common w V_J.
     stiffness: f64,
-    /// All particles in the displacement last given to [`BondForces::prepare`]; none before.
+    /// Displacement of all particles last given to [`BondForces::prepare`]; empty before.
     rows: Rows,
     kernel: Option<Box<dyn CloudKernel<D>>>,
     /// A law that only a table represents, and kθ.
     table: Option<(KernelFit, f64)>,
 }
 
-/// Refuses what is no cloud.
+/// Validates points, volumes and horizon.
 fn check<const D: usize>(points: &[[f64; D]], volumes: &[f64], horizon: f64) -> Result<(), Error> {
     let what = if points.is_empty() {
         "the body contains no particle".to_owned()
@@ -67,11 +67,11 @@ fn check<const D: usize>(points: &[[f64; D]], volumes: &[f64], horizon: f64) -> 
 }
 
 impl<const D: usize> CloudBonds<D> {
-    /// Bonds of all pairs within `horizon`, less those that cross a cut.
+    /// Bonds all pairs within `horizon`, except those that cross a cut.
     ///
     /// # Errors
-    /// [`Error::Geometry`] for an empty cloud, positions that are not finite, volumes too few, too many or not positive,
-    /// two particles in one place, or a horizon that is not positive.
+    /// [`Error::Geometry`] for an empty cloud, positions that are not finite, volumes too few, too many or
+    /// not positive, two particles in one place, or a horizon that is not positive.
     pub fn new(
         points: &[[f64; D]],
         volumes: &[f64],
@@ -83,7 +83,7 @@ impl<const D: usize> CloudBonds<D> {
         Self::with_gaps(points, volumes, thickness, horizon, volume_correction, cuts, None)
     }
 
-    /// As [`Self::new`], without the bonds that cross a gap.
+    /// Builds bonds as [`Self::new`] does, except those that cross a gap.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -135,7 +135,7 @@ impl<const D: usize> CloudBonds<D> {
         &self.input_order
     }
 
-    /// Sites whose family a cut has parted, ascending.
+    /// Sites whose family a cut has divided, ascending.
     pub fn parted(&self) -> &[u32] {
         &self.lists.parted
     }
@@ -155,12 +155,12 @@ impl<const D: usize> CloudBonds<D> {
         Lists { starts, neighbours, inverse_length, partial }
     }
 
-    /// A bond of a site by its [`Neighbour::index`], as if it were not softened.
+    /// Returns a bond of a site by its [`Neighbour::index`], ignoring softening.
     pub fn whole_bond(&self, site: usize, index: u32) -> Neighbour<D> {
         self.whole(site, self.lists.starts[site] + index as usize)
     }
 
-    /// e = λ² − 1 of the bonds of a site; 0 of those that are broken.
+    /// Computes e = λ² − 1 of the bonds of a site; 0 for broken ones.
     fn excesses<'a>(&'a self, displacement: &'a Field<D>, site: usize) -> impl Iterator<Item = f64> + 'a {
         let (position, moved) = (self.position.components(), displacement.components());
         let (here, own) = (self.position.get(site), displacement.get(site));
@@ -177,7 +177,7 @@ impl<const D: usize> CloudBonds<D> {
         })
     }
 
-    /// All sites from the first to the last that bonds of these have as ends.
+    /// Returns the range of sites that bonds of `sites` reach.
     fn met_by(&self, sites: Range<usize>) -> Range<usize> {
         let met = &self.lists.neighbours[self.lists.starts[sites.start]..self.lists.starts[sites.end]];
         let first = met.iter().min().map_or(sites.start, |&first| sites.start.min(first as usize));
@@ -202,7 +202,7 @@ impl<const D: usize> CloudBonds<D> {
     }
 }
 
-/// A whole bond, as it is among the softened ones of its site.
+/// Applies softening to an intact bond.
 fn weakened<const D: usize>(bond: Neighbour<D>, soft: &[Softened]) -> Neighbour<D> {
     let part = integrity(soft, bond.index);
     Neighbour { volume: part * bond.volume, weight: part * bond.weight, ..bond }

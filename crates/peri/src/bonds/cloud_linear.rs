@@ -1,6 +1,7 @@
-//! Both passes of materials whose forces are linear in a bond, on a cloud: moments of a family's displacements, and forces.
+//! The two passes of materials whose forces are linear in a bond, on clouds: moments of family displacements,
+//! and forces.
 //!
-//! What a neighbour brings lies together in four lanes, so that plain loops become vector instructions.
+//! The data of a neighbour lie together in four lanes, so that plain loops become vector instructions.
 
 use super::cloud_lists::Lists;
 use super::kernel::{Pass, dispatch};
@@ -24,7 +25,7 @@ struct Place {
     u: Lanes,
 }
 
-/// The particles of a cloud as both passes read them.
+/// Particles of a cloud in the layout of both passes.
 pub struct CloudPlaces<const D: usize> {
     places: Vec<Place>,
     /// θ of [`BodyGeometry::relief`]; empty where there is none.
@@ -46,7 +47,7 @@ pub struct CloudMoments<const D: usize> {
 }
 
 impl<const D: usize> CloudPlaces<D> {
-    /// Of a cloud at rest, without θ.
+    /// Builds the layout of an undeformed cloud, without θ.
     pub(super) fn new(position: &Field<D>, volumes: &[f64]) -> Self {
         let place = |(site, &volume): (usize, &f64)| {
             let mut x = lanes(position.get(site));
@@ -56,7 +57,7 @@ impl<const D: usize> CloudPlaces<D> {
         Self { places: volumes.iter().enumerate().map(place).collect(), shifts: Vec::new() }
     }
 
-    /// Takes a displacement.
+    /// Loads a displacement.
     pub fn load(&mut self, displacement: &Field<D>) {
         self.places.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, places)| {
             for (at, place) in places.iter_mut().enumerate() {
@@ -65,7 +66,7 @@ impl<const D: usize> CloudPlaces<D> {
         });
     }
 
-    /// How many [`Columns`] a particle has in the second pass: S, and P where there is θ.
+    /// Number of [`Columns`] of a particle in the second pass: S, and P if there is θ.
     pub fn stride(&self) -> usize {
         if self.shifts.is_empty() { 1 } else { 2 }
     }
@@ -76,12 +77,12 @@ fn lanes<const D: usize>(value: [f64; D]) -> Lanes {
 }
 
 impl<const D: usize> CloudBonds<D> {
-    /// The particles for both passes, without θ.
+    /// Builds the layout for both passes, without θ.
     pub fn bare_places(&self) -> CloudPlaces<D> {
         CloudPlaces::new(self.positions(), self.volumes())
     }
 
-    /// The particles for [`Self::moments`] and [`Self::linear_force`].
+    /// Builds the layout for [`Self::moments`] and [`Self::linear_force`].
     pub fn places(&self) -> CloudPlaces<D> {
         let mut places = self.bare_places();
         if let Some(relief) = self.relief() {
@@ -90,7 +91,7 @@ impl<const D: usize> CloudBonds<D> {
         places
     }
 
-    /// Moments of the particles of work item `chunk`; `visit` takes the site of each.
+    /// Computes the moments of the particles of work item `chunk`; `visit` receives each site.
     pub fn moments(
         &self,
         places: &CloudPlaces<D>,
@@ -100,8 +101,8 @@ impl<const D: usize> CloudBonds<D> {
         Arch::new().dispatch(MomentPass { lists: self.lists(), places, chunk, visit });
     }
 
-    /// Σ_J (V_J/|ξ|²)[(A_I + A_J) η + (S_I + S_J) ξ + (P_I + P_J)(θ_J − θ_I)] of the particles of work item `chunk`, with
-    /// [`CloudPlaces::stride`] `terms` a particle.
+    /// Computes Σ_J (V_J/|ξ|²)[(A_I + A_J) η + (S_I + S_J) ξ + (P_I + P_J)(θ_J − θ_I)] of the particles of
+    /// work item `chunk`, with [`CloudPlaces::stride`] `terms` a particle.
     pub fn linear_force(
         &self,
         places: &CloudPlaces<D>,
@@ -125,7 +126,7 @@ struct MomentPass<'a, const D: usize> {
 impl<const D: usize> WithSimd for MomentPass<'_, D> {
     type Output = ();
 
-    /// For the instruction set alone.
+    /// Compiles the loop for the instruction set.
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) {
         let relieved = !self.places.shifts.is_empty();
@@ -198,7 +199,7 @@ impl<const D: usize> Pass<D> for LinearPass<'_, D> {
         track: Option<&mut StretchRange>,
     ) {
         let mut seen = StretchRange::REST;
-        // whole lanes are kept: three of four would become single numbers
+        // full lanes are kept: three of four would become scalars
         let mut sums = [[0.0; 4]; BLOCK];
         for first in (0..force[0].len()).step_by(BLOCK) {
             let length = BLOCK.min(force[0].len() - first);

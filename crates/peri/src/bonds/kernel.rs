@@ -2,7 +2,8 @@
 //!
 //! Both evaluate, with η = u_J − u_I and e = λ² − 1 = η·(2ξ + η)/|ξ|² (no cancellation at small strain),
 //! the force density Σ_J c_IJ q(e) (ξ + η), q = t/(kθ λ), c = 2kθ w V_J/|ξ|, as in Eqs (2.6), (2.47).
-//! q is the rational fit of [`crate::potential::KernelFit`]: no square root, and no division where it is a polynomial.
+//! q is the rational fit of [`crate::potential::KernelFit`]: no square root, and no division where it is a
+//! polynomial.
 
 use super::real::Real;
 use crate::potential::StretchRange;

@@ -1,4 +1,5 @@
-//! A regular lattice of particles: one stencil of offsets, a bit mask of intact bonds per particle, no neighbour list.
+//! A regular lattice of particles: one stencil of offsets, a bit mask of intact bonds per particle, no
+//! neighbour list.
 
 mod connect;
 mod mixed;
@@ -27,7 +28,7 @@ pub struct LatticeBonds<const D: usize> {
     spans: Vec<Span<D>>,
     ratio: f64,
     volume_correction: VolumeCorrection,
-    /// Axes, from that on which neighbours are neighbours in storage.
+    /// Axes, in the order in which neighbours are adjacent in storage.
     order: [usize; D],
     /// Steps in sites along each axis.
     strides: [usize; D],
@@ -37,9 +38,10 @@ pub struct LatticeBonds<const D: usize> {
     intact: Vec<Vec<u64>>,
     classes: Vec<Class>,
     factors: Option<Field<D>>,
-    /// Whether they are the same along all axes.
+    /// True if the factors are equal along all axes.
     even: bool,
-    /// Interior value of the factors, a part of every stencil bond's weight; the stored factors are relative to it.
+    /// Interior value of the factors, included in every stencil bond's weight; stored factors are relative to
+    /// it.
     interior_factor: f64,
     kernel: Option<Box<dyn LatticeKernel<D>>>,
     /// A law that only a table represents, and kθ.
@@ -50,11 +52,12 @@ pub struct LatticeBonds<const D: usize> {
 }
 
 impl<const D: usize> LatticeBonds<D> {
-    /// Bonds of all occupied cells within `ratio` spacings, less those that cross a cut.
+    /// Bonds all occupied cells within `ratio` spacings, except pairs that cross a cut.
     ///
     /// # Errors
-    /// [`Error::Geometry`] where no cell is occupied, the list of occupied cells does not fit the box, the spacing is not
-    /// positive, the horizon is not finite or reaches no neighbour, or bonds need more memory than is left.
+    /// [`Error::Geometry`] if no cell is occupied, the list of occupied cells does not fit the box, the
+    /// spacing is not positive, the horizon is not finite or reaches no neighbour, or memory does not
+    /// suffice.
     pub fn new(
         lattice: Lattice<D>,
         ratio: f64,
@@ -64,7 +67,7 @@ impl<const D: usize> LatticeBonds<D> {
         Self::with_gaps(lattice, ratio, volume_correction, cuts, None)
     }
 
-    /// As [`Self::new`], without the bonds that cross a gap.
+    /// Builds bonds as [`Self::new`] does, except those that cross a gap.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -158,7 +161,7 @@ impl<const D: usize> LatticeBonds<D> {
         shift(self.strides, offset)
     }
 
-    /// Whether bond `k` of the particle in `site` is intact.
+    /// Returns true if bond `k` of the particle in `site` is intact.
     pub fn is_intact(&self, site: usize, k: usize) -> bool {
         self.intact[k / 64][site] >> (k % 64) & 1 == 1
     }
@@ -171,14 +174,14 @@ impl<const D: usize> LatticeBonds<D> {
         share * self.interior_factor * surface_weight(bond, length, factors.get(site), factors.get(other))
     }
 
-    /// What [`Self::weight`] and [`Self::is_intact`] of bond `k` come from.
+    /// Data of [`Self::weight`] and [`Self::is_intact`] for bond `k`.
     pub(crate) fn weights(&self, k: usize) -> Weights<'_, D> {
         let factors = self.factors.as_ref().map(Field::components);
         let share = self.spans[k].share * self.interior_factor;
         Weights { share, factors, words: &self.intact[k / 64], bit: 1 << (k % 64) }
     }
 
-    /// A bond of a site with the softened ones `soft`.
+    /// Returns a bond of a site, given the softened bonds of that site.
     fn bond_among(&self, soft: &[Softened], site: usize, index: u32) -> Neighbour<D> {
         let Span { shift, bond, length, share, .. } = self.spans[index as usize];
         let whole = integrity(soft, index) * self.lattice.volume;
@@ -193,7 +196,7 @@ impl<const D: usize> LatticeBonds<D> {
         }
     }
 
-    /// The bonds of the stencil, measured once.
+    /// Computes length, direction and share of each bond of the stencil.
     fn measure(&self) -> Vec<Span<D>> {
         let spacing = self.lattice.spacing;
         let span = |(k, &offset): (usize, &[i32; D])| {
@@ -206,12 +209,12 @@ impl<const D: usize> LatticeBonds<D> {
         self.stencil.offsets.iter().enumerate().map(span).collect()
     }
 
-    /// What sums over half of the stencil read: every bond of the body once.
+    /// Input of sums over half of the stencil: every bond of the body once.
     pub(super) fn spans<'a>(&'a self, displacement: &'a Field<D>) -> Spans<'a, D> {
         Spans { spans: &self.spans, tiles: self.tiles(displacement) }
     }
 
-    /// The bonds of the stencil with their stiffness 2kθ w V/|ξ|, for a modulus kθ.
+    /// Returns the bonds of the stencil with their stiffness 2kθ w V/|ξ|, for a modulus kθ.
     pub(crate) fn stencil_bonds(&self, modulus: f64) -> Vec<StencilBond<D>> {
         let scaled = |span: &Span<D>| {
             let stiffness =
@@ -221,12 +224,12 @@ impl<const D: usize> LatticeBonds<D> {
         self.spans.iter().map(scaled).collect()
     }
 
-    /// Whether no bond carries a weight of its own: integrities, or surface factors.
+    /// Returns true if no bond has its own weight from integrity or surface factors.
     pub(crate) fn is_uniform(&self) -> bool {
         self.factors.is_none() && self.softening.bonds().is_empty()
     }
 
-    /// What lattice kernels read, with a displacement.
+    /// Input of lattice kernels for a displacement.
     pub(super) fn tiles<'a>(&'a self, displacement: &'a Field<D>) -> Tiles<'a, D> {
         Tiles {
             displacement: displacement.components(),
@@ -431,7 +434,7 @@ impl<const D: usize> BondForces<D> for LatticeBonds<D> {
         self.is_uniform().then(|| self.spans(displacement).stiffness(sites, volume, table, least))
     }
 
-    /// Of bonds that do not soften.
+    /// Ignores softened bonds.
     fn gradient_sums(&self, displacement: &Field<D>, chunk: usize) -> Option<Vec<GradientSums<D>>> {
         let sites = chunk_range(chunk, self.sites);
         self.softening.bonds().is_empty().then(|| self.spans(displacement).gradient_sums(sites))

@@ -1,6 +1,7 @@
-//! Lattice kernels of materials with two passes: moments of a family's displacements, and forces that are linear in a bond.
+//! Lattice kernels of materials with two passes: moments of family displacements, and forces linear in a
+//! bond.
 //!
-//! Fields of `N` = 1 + D² components hold a scalar and then a tensor, rows first.
+//! Fields of `N` = 1 + D² components hold a scalar and then a tensor, row by row.
 
 use super::kernel::Pass;
 use super::lattice_kernel::{Class, TILE, Tiles};
@@ -8,7 +9,7 @@ use super::real::Real;
 use crate::potential::StretchRange;
 use pulp::{Arch, Simd, WithSimd};
 
-/// One bond of the stencil.
+/// A bond of the stencil.
 #[derive(Clone, Copy, Debug)]
 pub struct LinearRow<const D: usize> {
     /// Distance to the neighbour in sites.
@@ -24,17 +25,17 @@ pub struct LinearRow<const D: usize> {
 /// Moments of the particles in one tile: Σ_J (V_J/|ξ|²)|η|² and Σ_J (V_J/|ξ|²) η⊗ξ over the intact bonds.
 pub type Moments<const N: usize> = [[f64; TILE]; N];
 
-/// The first pass: moments of the tiles of a work item, each given to `visit` with its first site.
+/// The first pass: moments of the tiles of a work item; `visit` receives each tile's moments and first site.
 pub struct MomentPass<'a, const D: usize, const N: usize> {
     /// The stencil.
     pub rows: &'a [LinearRow<D>],
     /// The storage.
     pub tiles: &'a Tiles<'a, D>,
-    /// Sites from `start` on, `length` of them, both multiples of [`TILE`].
+    /// First site, a multiple of [`TILE`].
     pub start: usize,
-    /// As above.
+    /// Number of sites, a multiple of [`TILE`].
     pub length: usize,
-    /// Takes the moments.
+    /// Receives the moments.
     pub visit: &'a mut dyn FnMut(usize, &Moments<N>),
 }
 
@@ -48,7 +49,7 @@ pub struct LinearPass<'a, const D: usize, const N: usize> {
     pub terms: [&'a [f64]; N],
 }
 
-/// Asserts what the unchecked loads of both passes rely on; whether a tile of `base` may be read is asserted there.
+/// Asserts the bounds that the unchecked loads of both passes rely on, except those of each tile.
 fn check<const D: usize>(rows: &[LinearRow<D>], tiles: &Tiles<D>, start: usize, length: usize) -> usize {
     let sites = tiles.displacement[0].len();
     assert!(start.is_multiple_of(TILE) && length.is_multiple_of(TILE) && start + length <= sites);
@@ -58,7 +59,7 @@ fn check<const D: usize>(rows: &[LinearRow<D>], tiles: &Tiles<D>, start: usize, 
     sites
 }
 
-/// Which of the lanes from `base` have bond `k`.
+/// Returns the mask of the lanes from `base` that have bond `k`.
 ///
 /// # Safety
 /// A vector's width of sites follows `base` in every word.

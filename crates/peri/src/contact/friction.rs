@@ -1,4 +1,4 @@
-//! Friction of all that touches: between equilibria and in explicit dynamics.
+//! Friction of all contacts: between equilibria and in explicit dynamics.
 
 use super::Contact;
 use super::grip::{Grip, Pair};
@@ -17,7 +17,7 @@ pub struct Sliding {
 }
 
 impl<const D: usize> Contact<D> {
-    /// Has friction act as `grips` say, from the displacement `start` on.
+    /// Sets the friction of `grips`, from the displacement `start` on.
     pub fn hold(&mut self, start: &Field<D>, grips: Vec<Grip>) {
         self.held = grips;
         self.start = Some(start.clone());
@@ -29,8 +29,8 @@ impl<const D: usize> Contact<D> {
         self.start = None;
     }
 
-    /// Friction of all that touches at a displacement, sorted by pair: the slips of `old` go on with the normal forces there. What has
-    /// begun to touch since `start` slips for the rest of its way only.
+    /// Computes the friction of all contacts at a displacement, sorted by pair: the slips of `old` continue
+    /// with the present normal forces. Contacts that began after `start` slip for the rest of their way only.
     pub fn grips(
         &self,
         bonds: &dyn BodyGeometry<D>,
@@ -72,8 +72,8 @@ impl<const D: usize> Contact<D> {
         grips
     }
 
-    /// Friction after a load step, sorted by pair, for the next one; energy dissipated in the step, J, and force of friction of each
-    /// plane, N.
+    /// Returns the friction after a load step, sorted by pair, for the next one; the energy dissipated in the
+    /// step, J; and the friction force of each plane, N.
     pub fn slide(&self, displacement: &Field<D>) -> (Vec<Grip>, f64, Vec<[f64; 3]>) {
         let mut forces = vec![[0.0; 3]; self.planes().count()];
         let (mut dissipated, mut grips) = (0.0, self.held.clone());
@@ -81,7 +81,7 @@ impl<const D: usize> Contact<D> {
             let drag = grip.drag(self.slipped(grip.pair, displacement));
             grip.slip = drag.slip;
             match grip.pair {
-                // the other half is seen from the other side
+                // the other half is counted from the other side
                 Pair::Particles(..) => dissipated += 0.5 * drag.dissipated,
                 Pair::Face(plane, _) | Pair::Particle(plane, _) => {
                     dissipated += drag.dissipated;
@@ -114,7 +114,8 @@ impl<const D: usize> Contact<D> {
         self.held.iter().map(of).sum()
     }
 
-    /// Adds the force densities of friction between particles, N/m³, on the sites from `start` on, of one work item.
+    /// Adds the force densities of friction between particles, N/m³, on the sites from `start` on, of one
+    /// work item.
     pub(super) fn hold_pairs(&self, displacement: &Field<D>, start: usize, force: &mut [&mut [f64]; D]) {
         if self.start.is_none() {
             return;
@@ -128,7 +129,7 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Friction in force between particles, of those of some sites.
+    /// Returns the active friction between particles of a range of sites.
     fn held_by(&self, sites: Range<usize>) -> &[Grip] {
         let before = |end: usize| {
             self.held
@@ -137,8 +138,8 @@ impl<const D: usize> Contact<D> {
         &self.held[before(sites.start)..before(sites.end)]
     }
 
-    /// Friction after a step of explicit dynamics, s, with the velocity at the half step, m/s: the slips of `old` go on with the
-    /// present normal forces. Takes effect in [`Self::add_friction`].
+    /// Computes the friction after a step of explicit dynamics, s, with the velocity at the half step, m/s:
+    /// the slips of `old` continue with the present normal forces. It acts in [`Self::add_friction`].
     pub fn slide_on(
         &mut self,
         bonds: &dyn BodyGeometry<D>,
@@ -175,18 +176,19 @@ impl<const D: usize> Contact<D> {
         sliding
     }
 
-    /// Friction in force, sorted by pair.
+    /// Active friction, sorted by pair.
     pub fn active_grips(&self) -> &[Grip] {
         &self.held
     }
 
-    /// Has friction of explicit dynamics act as `grips` say.
+    /// Sets the friction of explicit dynamics.
     pub fn resume(&mut self, grips: &[Grip]) {
         self.held = grips.to_vec();
         self.start = None;
     }
 
-    /// Adds the force densities of friction after [`Self::slide_on`], N/m³, on the particles of work item `chunk`.
+    /// Adds the force densities of friction after [`Self::slide_on`], N/m³, on the particles of work item
+    /// `chunk`.
     pub fn add_friction(&self, chunk: usize, force: &mut [&mut [f64]; D]) {
         let start = chunk * CHUNK;
         for grip in self.held_by(start..start + force[0].len()) {

@@ -1,4 +1,4 @@
-//! Which particles without a bond are near each other, and how near.
+//! Lists unbonded pairs of particles near each other, with their distances.
 
 use super::vicinity::Vicinity;
 use crate::bonds::{BodyGeometry, CellGrid};
@@ -12,9 +12,9 @@ const OF_REFERENCE: f64 = 0.9;
 const OF_RADII: f64 = 1.35;
 /// Skin of the list, in spacings.
 const SKIN: f64 = 0.5;
-/// Above the part of a squared length by which single precision rounds it.
+/// Upper bound of the relative rounding error of a squared length in single precision.
 const ROUNDED: f64 = 1e-6;
-/// Farther than this many cells from the origin, particles are looked for in one place.
+/// Particles farther than this many cells from the origin share one cell.
 const FAR: f64 = (1_u64 << 38) as f64;
 
 /// Pairs of particles without a bond that are nearer than their contact distance, a gap and a skin.
@@ -28,28 +28,29 @@ pub struct List<const D: usize> {
     spacing: f64,
     gap: f64,
     skin: f64,
-    /// Where particles were when the list was made; `None` before, and where it is to be made anew.
+    /// Positions of particles when the list was made; `None` before, and if it must be rebuilt.
     vicinity: Option<Vicinity<D>>,
-    /// Particles with candidates, ascending, and where each one's end.
+    /// Particles with candidates, ascending, with the end of each one's candidates.
     listed: Vec<Listed>,
     candidates: Vec<Candidate<D>>,
     /// Particles without bonds, ascending.
     pub alone: Vec<u32>,
-    /// How often it was made.
+    /// Number of rebuilds.
     pub rebuilds: u64,
 }
 
-/// A particle that others are near to.
+/// A particle with others near it.
 #[derive(Clone, Copy)]
 pub struct Listed {
     pub site: u32,
-    /// Ends of its candidates, of which the first begin where those of the particle before it end.
+    /// End of its candidates, which begin at the end of those of the previous particle.
     end: usize,
-    /// Whether it has no bonds.
+    /// True if it has no bonds.
     pub alone: bool,
 }
 
-/// A particle near another, seen from there. Lists are long and most of their pairs apart: it holds no more than shows that.
+/// A particle near another, as seen from the latter. Lists are long and most pairs are apart, so it holds
+/// only what shows that.
 #[derive(Clone, Copy)]
 struct Candidate<const D: usize> {
     site: u32,
@@ -57,20 +58,20 @@ struct Candidate<const D: usize> {
     bond: [f32; D],
 }
 
-/// A particle that is near enough to another, seen from there.
+/// A particle near enough to another, as seen from the latter.
 pub struct Near<const D: usize> {
     pub site: u32,
     /// ξ, m.
     bond: [f64; D],
     /// d, m.
     pub distance: f64,
-    /// ζ, m, and r = |ζ|: the same bits from either side, but for the sign of ζ.
+    /// ζ, m, and r = |ζ|: the same bits from either side, except for the sign of ζ.
     pub zeta: [f64; D],
     pub r: f64,
 }
 
 impl<const D: usize> Near<D> {
-    /// ζ/r; of two particles in one place ξ/|ξ|.
+    /// ζ/r; ξ/|ξ| for two particles at one point.
     pub fn direction(&self) -> [f64; D] {
         let (along, size) = if self.r > 0.0 { (self.zeta, self.r) } else { (self.bond, length(self.bond)) };
         along.map(|x| x / size)
@@ -89,7 +90,7 @@ impl<const D: usize> Near<D> {
 }
 
 impl<const D: usize> List<D> {
-    /// Of the undeformed body.
+    /// Creates an empty list for the undeformed body.
     pub fn new(bonds: &dyn BodyGeometry<D>, gap: f64) -> Self {
         let volumes: Vec<f64> = bonds.particles().iter().map(|&site| bonds.volume(site as usize)).collect();
         let mean = volumes.iter().sum::<f64>() / volumes.len() as f64;
@@ -128,17 +129,17 @@ impl<const D: usize> List<D> {
         self.vicinity = None;
     }
 
-    /// Rebuilds the list where pairs that it lacks may have come near since it was made.
+    /// Rebuilds the list if pairs outside it may have come near since it was made.
     pub fn update(&mut self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) {
         if !self.vicinity.as_mut().is_some_and(|vicinity| vicinity.holds(bonds.particles(), displacement)) {
             self.rebuild(bonds, displacement);
         }
     }
 
-    /// Takes in the pairs of sites whose bonds have just broken, each from both of its ends: the list is then that which would
-    /// have been made of the bonds that are left.
+    /// Adds the pairs of sites whose bonds have just broken, each from both ends: the result equals a list
+    /// made from the remaining bonds.
     pub fn part(&mut self, bonds: &dyn BodyGeometry<D>, pairs: &[[u32; 2]]) {
-        // else the next update makes it anew
+        // otherwise the next update rebuilds it
         let Some(vicinity) = &self.vicinity else { return };
         let reach = self.gap + self.skin;
         let near = |&[own, other]: &[u32; 2]| {
@@ -163,7 +164,7 @@ impl<const D: usize> List<D> {
             let (new, others) = found.split_at(found.partition_point(|new| new.0 == site));
             found = others;
             if !new.is_empty() {
-                // a list made since the bonds broke has them
+                // a list made after the bonds broke has these pairs
                 let lacks =
                     |new: &&(u32, Candidate<D>)| known.binary_search_by_key(&new.1.site, |c| c.site).is_err();
                 self.candidates.extend(new.iter().filter(lacks).map(|new| new.1));
@@ -181,7 +182,7 @@ impl<const D: usize> List<D> {
         self.alone.dedup();
     }
 
-    /// Makes the list for a displacement.
+    /// Rebuilds the list for a displacement.
     pub fn rebuild(&mut self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) {
         // frees its memory first
         self.vicinity = None;
@@ -199,7 +200,7 @@ impl<const D: usize> List<D> {
         let near = |own: usize, found: &mut Vec<u32>| {
             found.clear();
             let site = particles[own] as usize;
-            // a little more: far from the origin places are rounded to 2⁻¹⁴ of an edge
+            // a little more: far from the origin positions are rounded to 2⁻¹⁴ of an edge
             let radius = OF_RADII * (self.radius(site) + self.largest) + reach + 1e-3 * edge;
             let here = places[own];
             grid.near(here, radius, |other| {
@@ -256,7 +257,7 @@ impl<const D: usize> List<D> {
         self.radii.get(site).copied().unwrap_or(self.largest)
     }
 
-    /// What two particles with the reference bond ξ are to each other where r < d + `gap`.
+    /// Returns the pair of two particles with the reference bond ξ if r < d + `gap`.
     fn near(
         &self,
         own: usize,
@@ -277,7 +278,8 @@ impl<const D: usize> List<D> {
         Candidate { site: near.site, bond: near.bond.map(|x| (x / self.spacing) as f32) }
     }
 
-    /// The particles of `sites` that others are near to, each with those at r < d + `gap`, up to the gap of the list.
+    /// Iterates over the particles of `sites` that have others at r < d + `gap`, up to the gap of the list,
+    /// with these.
     pub fn pairs<'a>(
         &'a self,
         bonds: &'a dyn BodyGeometry<D>,
@@ -302,7 +304,8 @@ impl<const D: usize> List<D> {
                     reference += bond * bond;
                     square += zeta * zeta;
                 }
-                // most are farther apart by much more than rounding of ξ to single precision, which costs no root to see
+                // most are apart by far more than the single-precision rounding of ξ; no root is needed to
+                // see it
                 let closest = (OF_REFERENCE * OF_REFERENCE * reference).min(most * most);
                 if square
                     > 2.0 * gap * gap + (1.0 + f64::from(gap > 0.0) + ROUNDED) * closest + ROUNDED * reference

@@ -21,7 +21,7 @@ impl<const D: usize> Planes<D> {
         std::array::from_fn(|d| if d < D { step * v[d] - (placed.now[d] - placed.before[d]) } else { 0.0 })
     }
 
-    /// Takes the forces of friction in explicit dynamics from elastic slips.
+    /// Computes the friction forces of explicit dynamics from elastic slips.
     pub fn drag(&mut self, held: &[Grip]) {
         let mut drags = std::mem::take(&mut self.drags);
         drags.clear();
@@ -42,8 +42,9 @@ impl<const D: usize> Planes<D> {
         }
     }
 
-    /// Friction of all that touches at a displacement, with the normal forces there; the slips of `old`, sorted by pair, go on. What has begun to touch
-    /// since `start` has slipped for its part of the way alone.
+    /// Computes the friction of all contacts at a displacement, with the normal forces there; the slips of
+    /// `old`, sorted by pair, continue. Contacts that began after `start` slip for their part of the way
+    /// only.
     pub fn grips(&self, field: &Field<D>, start: &Field<D>, old: &[Grip]) -> Vec<Grip> {
         let mut grips = Vec::new();
         for (number, placed) in self.each.iter().enumerate() {
@@ -62,7 +63,7 @@ impl<const D: usize> Planes<D> {
                 let normal = std::array::from_fn(|d| plane.normal.get(d).copied().unwrap_or(0.0));
                 let known = old.binary_search_by_key(&pair, |grip| grip.pair).ok().map(|at| &old[at]);
                 let then = self.beside(placed, start, touch.element).overlap - {
-                    // `beside` has the plane where it is now
+                    // `beside` uses the current position of the plane
                     let now: f64 = (0..D).map(|d| placed.now[d] * plane.normal[d]).sum();
                     now - shift
                 };

@@ -1,4 +1,4 @@
-//! Stiffness of contact: for time steps, masses of relaxation, preconditioners and the lengths of their steps.
+//! Stiffness of contact: for time steps, masses of relaxation, preconditioners and their step lengths.
 
 use super::Contact;
 use super::list::{Listed, Near};
@@ -8,12 +8,13 @@ use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field, chunk_range};
 use rayon::prelude::*;
 
-/// Sees a face: particles below it with weights, the direction in which it is held (`None`: all), the stiffness, N/m.
+/// Visitor of a face: particles below with weights, the direction in which it is held (`None`: all), the
+/// stiffness, N/m.
 pub type Spring<'a, const D: usize> = dyn FnMut(&[(usize, f64)], Option<[f64; D]>, f64) + 'a;
 
 impl<const D: usize> Contact<D> {
-    /// max_I Σ_J k V_J over what touches, with half of what planes add, N/m⁴: twice that over the density bounds what contact adds to
-    /// the squared greatest frequency.
+    /// Computes max_I Σ_J k V_J over all contacts plus half the stiffness of planes, N/m⁴: twice that over
+    /// the density bounds the share of contact in the squared greatest frequency.
     pub fn greatest_stiffness(&self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) -> f64 {
         let sites = displacement.sites();
         let of = |chunk: usize| {
@@ -32,16 +33,17 @@ impl<const D: usize> Contact<D> {
         0.5 * (planes + self.ties.as_ref().map_or(0.0, Ties::greatest))
     }
 
-    /// k V of the largest particle, and half of what planes add: the least that [`Contact::greatest_stiffness`] is where anything
-    /// touches, if all are alike.
+    /// Sums k V of the largest particle and half the stiffness of planes: the least value of
+    /// [`Contact::greatest_stiffness`] with any contact, if all particles are alike.
     pub fn pair_stiffness(&self) -> f64 {
         self.stiffness * self.largest_volume + self.half_of_planes()
     }
 
-    /// Adds to the Gershgorin sums of dynamic relaxation, in units of `tangent`, those of what touches or is about to:
-    /// Σ_J k V_J (1 + max_{d≠e} |n_d n_e|), and of planes. A particle that became heavy only in touch would be driven far into
-    /// another as a light one, out again as a heavy one, and so on indefinitely. A particle without bonds has twice that alone:
-    /// it starts each step from rest, see [`Contact::still`], and so must not go farther than a gradient step may.
+    /// Adds contacts, present or imminent, to the Gershgorin sums of dynamic relaxation, in units of
+    /// `tangent`: Σ_J k V_J (1 + max_{d≠e} |n_d n_e|), and planes. A particle that became heavy only in
+    /// contact would enter another as a light one and leave as a heavy one, and so on indefinitely. A
+    /// particle without bonds has twice the sum: it starts each step from rest, see [`Contact::still`], and
+    /// must not go farther than a gradient step.
     pub fn add_stiffness(
         &self,
         bonds: &dyn BodyGeometry<D>,
@@ -60,7 +62,7 @@ impl<const D: usize> Contact<D> {
         });
     }
 
-    /// As [`Self::add_stiffness`], of pairs alone.
+    /// Adds the sums of pairs only, as [`Self::add_stiffness`].
     pub fn add_pairs(
         &self,
         bonds: &dyn BodyGeometry<D>,
@@ -70,7 +72,7 @@ impl<const D: usize> Contact<D> {
     ) {
         let of = |own: u32, Near { site, zeta, r, .. }: Near<D>| {
             let unit = zeta.map(|x| x / r.max(f64::MIN_POSITIVE));
-            // friction holds in all directions
+            // friction acts in all directions
             let mixed = if self.friction > 0.0 { 1.0 } else { mixed(unit) };
             self.pair(own, site) * bonds.volume(site as usize) * (1.0 + mixed)
         };
@@ -88,7 +90,8 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Visits faces that touch planes or are tied: particles below with weights, the normal of a plane without friction, the stiffness, N/m.
+    /// Visits faces in contact with planes or tied: particles below with weights, the normal of a plane
+    /// without friction, the stiffness, N/m.
     pub fn springs(&self, displacement: &Field<D>, visit: &mut Spring<D>) {
         self.near_springs(displacement, 0.0, visit);
     }
@@ -102,13 +105,13 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Numbers of the faces in touch with planes, plane by plane.
+    /// Numbers of the faces in contact with planes, plane by plane.
     pub fn in_touch(&self, displacement: &Field<D>) -> Vec<[u32; 2]> {
         self.planes.as_ref().map_or_else(Vec::new, |planes| planes.in_touch(displacement))
     }
 
-    /// How far a step along a direction may go so that none leaps past another: by a quarter of a spacing against each
-    /// other where they touch or are about to, by half of one at all. ∞ along a direction of zeros.
+    /// Longest step along a direction in which no particle jumps past another: a relative motion of a quarter
+    /// of a spacing for contacts present or imminent, of half a spacing for all. ∞ along a zero direction.
     pub fn longest_step(
         &self,
         bonds: &dyn BodyGeometry<D>,
@@ -116,7 +119,7 @@ impl<const D: usize> Contact<D> {
         direction: &Field<D>,
     ) -> f64 {
         if !self.has_pairs() {
-            // nothing leaps past a plane
+            // nothing jumps past a plane
             return f64::INFINITY;
         }
         let sites = displacement.sites();
@@ -141,7 +144,7 @@ impl<const D: usize> Contact<D> {
         self.near / (0.5 * farthest.sqrt()).max(closing.sqrt())
     }
 
-    /// Brings particles without bonds to rest: what is pushed aside does not fly on in a search for equilibrium.
+    /// Stops particles without bonds, so that they do not fly on in a search for equilibrium.
     pub fn still(&self, velocity: &mut Field<D>) {
         self.list.alone.iter().for_each(|&site| velocity.set(site as usize, [0.0; D]));
     }

@@ -1,4 +1,5 @@
-//! Computed stresses around a hole at the origin of a plate under tension along x, compared with closed forms.
+//! Computed stresses around a hole at the origin of a plate under tension along x, compared with closed
+//! forms.
 
 use super::{Plate, kirsch};
 use crate::bonds::Bonds;
@@ -9,10 +10,10 @@ use rayon::prelude::*;
 pub struct HoleComparison {
     /// Kirsch's solution, Eq. (2.81).
     pub kirsch: Vec<f64>,
-    /// That of the plate, where it is known; else Kirsch's.
+    /// Solution of the finite plate, if known; else Kirsch's.
     pub exact: Vec<f64>,
     radius: f64,
-    /// Where the ring about the hole ends, m.
+    /// Outer radius of the ring around the hole, m.
     near: f64,
     distance: Vec<f64>,
     inner: Vec<bool>,
@@ -23,18 +24,18 @@ pub struct HoleComparison {
 /// Particles over which an error is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Region {
-    /// All of them.
+    /// All particles.
     All,
-    /// Those on which no load or support acts.
+    /// Particles without loads and supports.
     Inner,
-    /// Those up to 2δ from the hole.
+    /// Particles up to 2δ from the hole.
     Ring,
-    /// Those beyond, up to five radii.
+    /// Particles farther than 2δ, up to five radii.
     Bulk,
 }
 
 impl HoleComparison {
-    /// Evaluates the exact stresses of a hole of this radius, m, in a body of whose sites some are `loaded`.
+    /// Evaluates the exact stresses of a hole of this radius, m, in a body; `loaded` marks its loaded sites.
     pub fn new<const D: usize>(
         bonds: &dyn Bonds<D>,
         radius: f64,
@@ -77,12 +78,12 @@ impl HoleComparison {
         (sum / count.max(1) as f64).sqrt()
     }
 
-    /// Largest value of the particles on which no load or support acts.
+    /// Largest value of the particles without loads and supports.
     pub fn most(&self, normal: &[f64]) -> f64 {
         (0..normal.len()).filter(|&i| self.inner[i]).map(|i| normal[i]).fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Heights above the hole, m, and the mean values there; empty where no particle is near the line x = 0.
+    /// Heights above the hole, m, and the mean values there; empty if no particle is near the line x = 0.
     pub fn profile(&self, values: &[f64]) -> [Vec<f64>; 2] {
         let mean = |members: &[usize]| members.iter().map(|&i| values[i]).sum::<f64>() / members.len() as f64;
         [self.column.iter().map(|row| row.0).collect(), self.column.iter().map(|row| mean(&row.1)).collect()]

@@ -1,4 +1,4 @@
-//! Rubber as the full network: a Langevin chain along every bond, and a pressure that keeps the volume.
+//! Rubber as the full network: a Langevin chain along every bond, and a pressure that conserves the volume.
 
 use super::crushed::{logarithm, logarithm_slopes};
 use super::eight_chain::LINEAR;
@@ -10,13 +10,15 @@ use crate::calibrate::modulus_in;
 use crate::error::Error;
 use polycore::langevin;
 
-/// Chains of n links along the bonds of a family in space, which move with it (Treloar & Riding 1979, doi:10.1098/rspa.1979.0163):
-/// W = Σ ŵψ(λ) − ½ψ′(1)(M − 1/3):(FᵀF − 1) − ⅓ψ′(1) ln J + ¼κ(J² − 1 − 2 ln J), per intact part I of the family, with ŵ, M and F of
-/// [`super::Deformation`] and ψ = c n [xβ + ln(β/sinh β)], x = λ/√n, β = 𝓛⁻¹(x), ψ′ = c√n β.
+/// Chains of n links along the bonds of a family in space, which move with it (Treloar & Riding 1979,
+/// doi:10.1098/rspa.1979.0163): W = Σ ŵψ(λ) − ½ψ′(1)(M − 1/3):(FᵀF − 1) − ⅓ψ′(1) ln J + ¼κ(J² − 1 − 2 ln J),
+/// per intact part I of the family, with ŵ, M and F of [`super::Deformation`] and ψ = c n [xβ + ln(β/sinh
+/// β)], x = λ/√n, β = 𝓛⁻¹(x), ψ′ = c√n β.
 ///
-/// The second term takes off what the pre-tension of chains does in families that are not isotropic (edges, lattices). A homogeneous
-/// deformation is exact, rest has no force, and Poisson's ratio is free. Where too few bonds are left for a gradient, springs of the
-/// same shear modulus act as in [`super::NonlocalSolid`].
+/// The second term removes the effect of the chains' pre-tension in families that are not isotropic (edges,
+/// lattices). A homogeneous deformation is exact, the reference state has no force, and Poisson's ratio is
+/// free. If too few bonds are left for a gradient, springs of the same shear modulus act as in
+/// [`super::NonlocalSolid`].
 #[derive(Clone, Copy, Debug)]
 pub struct Affine {
     shear: f64,
@@ -28,7 +30,7 @@ pub struct Affine {
 }
 
 impl Affine {
-    /// Of a shear modulus μ and a bulk modulus K at rest, Pa, and n > 1 links a chain.
+    /// Creates the law of a shear modulus μ and a bulk modulus K at rest, Pa, and n > 1 links a chain.
     ///
     /// # Errors
     /// [`Error::Parameter`].
@@ -89,7 +91,7 @@ impl Affine {
     }
 }
 
-/// What a particle knows of its family.
+/// State of a particle's family.
 #[derive(Clone, Debug)]
 pub struct AffinePoint {
     /// Σ_J V_J of the whole family and of the intact bonds, m³.
@@ -100,9 +102,9 @@ pub struct AffinePoint {
     inverse: Tensor<3>,
     least: f64,
     gradient: Tensor<3>,
-    /// Q = P M⁻¹ of what is not chains, Pa.
+    /// Q = P M⁻¹ without chains, Pa.
     stress: Tensor<3>,
-    /// A bound of the stiffness of `stress`, N/m⁴.
+    /// Bound of the stiffness of `stress`, N/m⁴.
     own: f64,
 }
 
@@ -203,7 +205,7 @@ impl Material<3> for Affine {
         chains + point.intact / point.whole * rest
     }
 
-    /// Chains and springs of both ends by Gershgorin; of what is not chains as in [`super::NonlocalSolid`].
+    /// Chains and springs of both ends by Gershgorin; the other terms as in [`super::NonlocalSolid`].
     fn stiffness(&self, family: &Family<3>, points: &[AffinePoint]) -> f64 {
         let mut most = points[family.site()].own;
         let springs = family.sum(|bond| {

@@ -1,4 +1,4 @@
-//! Both passes of a solid on a cloud, by the kernels of [`crate::bonds`].
+//! The two passes of a solid on a cloud, by the kernels of [`crate::bonds`].
 
 use super::family::Bond;
 use super::point::Point;
@@ -12,10 +12,10 @@ use crate::bonds::{
 use crate::field::{CHUNK, Field, chunk_range};
 use rayon::prelude::*;
 
-/// What both passes read of every particle.
+/// Data of every particle that both passes read.
 pub struct CloudPasses<const D: usize> {
     places: CloudPlaces<D>,
-    /// A and S, and where there is θ also P, over Σ_K V_K.
+    /// A and S, and if there is θ also P, over Σ_K V_K.
     terms: Vec<Columns<D>>,
     families: Families,
 }
@@ -28,7 +28,7 @@ impl<const D: usize> CloudPasses<D> {
     }
 }
 
-/// A softened bond, and what it lacks of V/|ξ|², as a negative number.
+/// Returns a softened bond and its loss of V/|ξ|², as a negative number.
 fn lack<const D: usize>(cloud: &CloudBonds<D>, soft: &Softened, displacement: &Field<D>) -> (f64, Bond<D>) {
     let site = soft.site as usize;
     let bond = Bond::new(site, &cloud.whole_bond(site, soft.index), displacement);
@@ -60,7 +60,7 @@ impl<L: PointLaw<D>, const D: usize> Passes<NonlocalSolid<L>, D> for CloudPasses
                     let mut square = moments.square;
                     let mut moment = Tensor::<D>::from_fn(|a, b| moments.first[b][a]);
                     let mut shifted = Tensor::<D>::from_fn(|a, b| moments.shifted[b][a]);
-                    // the kernel takes every bond for intact
+                    // the kernel treats every bond as intact
                     for soft in among(soft, site..site + 1) {
                         let (lack, bond) = lack(cloud, soft, displacement);
                         square += bond.change.iter().map(|x| lack * x * x).sum::<f64>();

@@ -1,6 +1,6 @@
-//! Functions of J = det F that go on as parabolas where a material is crushed.
+//! Functions of J = det F, continued as parabolas below a limit of compression.
 
-/// J below which ln J and J⁻² go on as parabolas.
+/// J below which ln J and J⁻² are continued as parabolas.
 pub(super) const CRUSHED: f64 = 0.2;
 
 /// ln J at J = 1 + `change`, a parabola below [`CRUSHED`].

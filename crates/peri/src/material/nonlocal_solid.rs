@@ -1,4 +1,5 @@
-//! Solids of the mean deformation of a family, with any Poisson ratio: correspondence and its stabilisation as one energy.
+//! Solids of the mean family deformation, with any Poisson ratio: correspondence and its stabilisation as one
+//! energy.
 
 use super::cloud_passes::CloudPasses;
 use super::crushed::CRUSHED;
@@ -71,8 +72,8 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
         std::array::from_fn(|a| unit * linear[a] + pull[a])
     }
 
-    /// W − ½Gr + [z·PM⁻¹ξ + ½ D G|z|²]/|ξ|² with z = ζ − Fξ; of springs their energy per share. With θ, C = Σ_J ω ζ⊗z(θ)/I:
-    /// z = ζ − (F − C)ξ, and z·Pz(θ)/|ξ|² − P:C in addition.
+    /// W − ½Gr + [z·PM⁻¹ξ + ½ D G|z|²]/|ξ|² with z = ζ − Fξ; for springs their energy per share. With θ, C =
+    /// Σ_J ω ζ⊗z(θ)/I: z = ζ − (F − C)ξ, and z·Pz(θ)/|ξ|² − P:C in addition.
     fn released_energy(&self, bond: &Bond<D>, own: &Point<D>, weighed: f64) -> Option<f64> {
         let square = bond.length * bond.length;
         let Some(deformation) = own.deformation() else {
@@ -115,8 +116,8 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
         }
     }
 
-    /// Half of 1.75 (2D) or 1 (3D) times the greatest part of a particle and its neighbours: 1.1 to 3 times the true bound on
-    /// lattices and clouds.
+    /// Half of 1.75 (2D) or 1 (3D) times the greatest share of a particle and its neighbours: 1.1 to 3 times
+    /// the true bound on lattices and clouds.
     fn stiffness(&self, family: &Family<D>, points: &[Point<D>]) -> f64 {
         let mut most = points[family.site()].own;
         family.each(|bond| most = most.max(points[bond.to].own));
@@ -132,7 +133,7 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
         change.is_nan() || change < CRUSHED - 1.0
     }
 
-    /// Of Young's modulus E ≈ 3μ.
+    /// Micromodulus for Young's modulus E ≈ 3μ.
     fn micromodulus(&self, bonds: &dyn BodyGeometry<D>) -> f64 {
         modulus_in(bonds, 3.0 * self.0.shear_modulus())
     }

@@ -28,13 +28,13 @@ enum Kind {
 }
 
 impl Rubber {
-    /// Rubber of Young's modulus E, Pa, that does not break. Chains have n̄ = 720 links of D̂ = 1200 unless
-    /// [`Self::chains`] says otherwise.
+    /// Creates rubber of Young's modulus E, Pa, that does not break. Chains have n̄ = 720 links of D̂ = 1200
+    /// unless [`Self::chains`] sets others.
     pub fn new(law: Law, youngs_modulus: f64) -> Self {
         Self::of(Kind::Named(law), youngs_modulus)
     }
 
-    /// Rubber of any law, which is scaled so that t′(1) = 3, as the calibration of kθ expects.
+    /// Creates rubber of any law, scaled so that t′(1) = 3, as the calibration of kθ expects.
     pub fn of_law(law: impl BondPotential + 'static, youngs_modulus: f64) -> Self {
         Self::of(Kind::Own(Arc::new(law)), youngs_modulus)
     }
@@ -44,30 +44,30 @@ impl Rubber {
         Self { law, youngs_modulus, links, dissociation, calibration, critical: None }
     }
 
-    /// Chains of n̄ `links` and a dissociation energy D̂, in units of kθ.
+    /// Sets chains of n̄ `links` and a dissociation energy D̂, in units of kθ.
     pub fn chains(mut self, links: f64, dissociation: f64) -> Self {
         (self.links, self.dissociation) = (links, dissociation);
         self
     }
 
-    /// Takes kθ from the lattice's own sums or from the continuum's integrals, which is the default.
+    /// Sets the source of kθ: the lattice's sums or the continuum's integrals, the default.
     pub fn calibration(mut self, calibration: Calibration) -> Self {
         self.calibration = calibration;
         self
     }
 
-    /// Bonds break at a stretch λ_c.
+    /// Breaks bonds at a stretch λ_c.
     pub fn critical_stretch(mut self, stretch: f64) -> Self {
         self.critical = Some(Critical { stretch: Some(stretch), ..Critical::default() });
         self
     }
 
-    /// Bonds break at the stretch that follows from a tearing energy G, J/m², see [`Convention::Tearing`].
+    /// Breaks bonds at the stretch that follows from a tearing energy G, J/m², see [`Convention::Tearing`].
     pub fn fracture_energy(self, energy: f64) -> Self {
         self.fracture_energy_by(Convention::Tearing, energy)
     }
 
-    /// Bonds break at the stretch that follows from a fracture energy G, J/m², by a convention.
+    /// Breaks bonds at the stretch that follows from a fracture energy G, J/m², by a convention.
     pub fn fracture_energy_by(mut self, convention: Convention, energy: f64) -> Self {
         let (energy, convention) = (Some(EnergyPerArea::from_si(energy)), Some(convention));
         self.critical = Some(Critical { fracture_energy: energy, convention, ..Critical::default() });

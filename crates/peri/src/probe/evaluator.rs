@@ -1,4 +1,4 @@
-//! Forces, stresses, energy-momentum and flags of a state, of bond laws and of solids.
+//! Forces, stresses, energy-momentum and flags of a state, for bond laws and solids.
 
 use crate::bonds::Bonds;
 use crate::material::{BondMaterial, Family, NonlocalSolid, PointLaw, Pointwise, Response, Tensor as Matrix};
@@ -16,14 +16,14 @@ pub type Solid<const D: usize> = NonlocalSolid<Arc<dyn PointLaw<D>>>;
 pub struct StressEvaluator<const D: usize>(Kind<D>);
 
 enum Kind<const D: usize> {
-    /// A bond law, with the fit that the solver makes: bonds then carry the solver's own forces.
+    /// A bond law, with the solver's fit: bonds then carry the solver's forces.
     Bonds {
         material: BondMaterial<'static>,
         /// Largest relative error of the fit.
         bound: f64,
-        /// Whether the law is constant beyond the fitted stretches.
+        /// True if the law is constant beyond the fitted stretches.
         clamped: bool,
-        /// The fit made last, with its stretches.
+        /// Last fit, with its stretches.
         last: Mutex<Option<([f64; 2], KernelFit)>>,
     },
     Nothing,
@@ -36,24 +36,25 @@ enum Kind<const D: usize> {
 }
 
 impl<const D: usize> StressEvaluator<D> {
-    /// An evaluator of nothing: no forces, no stresses.
+    /// Creates an empty evaluator: no forces, no stresses.
     pub fn none() -> Self {
         Self(Kind::Nothing)
     }
 
-    /// An evaluator of a bond law that is fitted to a relative error of `bound`; where bonds break the law is `clamped` beyond the
-    /// fitted stretches.
+    /// Creates an evaluator of a bond law that is fitted to a relative error of `bound`; the law is `clamped`
+    /// beyond the fitted stretches if bonds break.
     pub fn of_bonds(material: BondMaterial<'static>, bound: f64, clamped: bool) -> Self {
         Self(Kind::Bonds { material, bound, clamped, last: Mutex::new(None) })
     }
 
-    /// An evaluator of a solid; `bonds` are those of the body as it was built. A law `learnt` from data has flags.
+    /// Creates an evaluator of a solid; `bonds` are those of the reference state. A law `learnt` from data
+    /// has flags.
     pub fn of_solid(law: Arc<dyn PointLaw<D>>, learnt: bool, bonds: &dyn Bonds<D>) -> Self {
         let states = Mutex::new(Pointwise::new(NonlocalSolid(law.clone()), bonds));
         Self(Kind::Solid { law, learnt, states })
     }
 
-    /// The bond law, where it is one.
+    /// Bond law, if the material is one.
     pub fn bond_material(&self) -> Option<&BondMaterial<'static>> {
         match &self.0 {
             Kind::Bonds { material, .. } => Some(material),
@@ -61,8 +62,8 @@ impl<const D: usize> StressEvaluator<D> {
         }
     }
 
-    /// Sums forces of the bonds of `sites` to the sites that `wanted` names, N, each on the particle in the first: `visit` takes
-    /// that site and the sum.
+    /// Sums the forces of the bonds from `sites` to the sites that `wanted` accepts, N, each on its first
+    /// particle: `visit` receives that site and the sum.
     pub fn forces(
         &self,
         bonds: &dyn Bonds<D>,
@@ -122,10 +123,11 @@ impl<const D: usize> StressEvaluator<D> {
         }
     }
 
-    /// Couples Σ V_I V_J (x_J − x_I) × T_IJ of the bonds of `sites` to the sites that `wanted` names, N m.
+    /// Couples Σ V_I V_J (x_J − x_I) × T_IJ of the bonds of `sites` to the sites that `wanted` accepts, N m.
     ///
-    /// Bonds of solids are not parallel to their forces, T_IJ − T_JI, and Σ_J V_J (x_J − x_I) × T_IJ = 0 in a whole family alone.
-    /// With it, the moment of the forces of `sites` is what the body transmits.
+    /// Bonds of solids are not parallel to their forces, T_IJ − T_JI, and Σ_J V_J (x_J − x_I) × T_IJ = 0
+    /// holds in a whole family only. With these couples, the moment of the forces of `sites` is the moment
+    /// that the body transmits.
     pub fn couple(
         &self,
         bonds: &dyn Bonds<D>,
@@ -172,8 +174,8 @@ impl<const D: usize> StressEvaluator<D> {
         Some([piola, cauchy])
     }
 
-    /// Eshelby's energy–momentum ∇uᵀP − W 1 of a solid at some sites, Pa; `visit` takes the place in `sites` with it. Nothing
-    /// of bond laws, and of particles without deformation gradient.
+    /// Computes Eshelby's energy–momentum ∇uᵀP − W 1 of a solid at some sites, Pa; `visit` receives the index
+    /// in `sites` with it. Skips bond laws, and particles without deformation gradient.
     pub fn energy_momentum(
         &self,
         bonds: &dyn Bonds<D>,
@@ -194,7 +196,8 @@ impl<const D: usize> StressEvaluator<D> {
         }
     }
 
-    /// Where and why a learnt law is uncertain, particle by particle; none where it is not at work; `None` for laws in closed form.
+    /// Uncertainties of a learnt law, particle by particle; none for particles without it; `None` for laws in
+    /// closed form.
     pub fn flags(&self, bonds: &dyn Bonds<D>, state: &State<D>) -> Option<Vec<Flags>> {
         let Kind::Solid { law, learnt: true, states } = &self.0 else { return None };
         let states = prepared(states, bonds, state);
@@ -204,7 +207,7 @@ impl<const D: usize> StressEvaluator<D> {
         Some(bonds.particles().par_iter().map(of).collect())
     }
 
-    /// The shares of particles outside of the box of the training data, and with any flag.
+    /// Fractions of particles outside the box of the training data, and with any flag.
     pub fn flagged(&self, bonds: &dyn Bonds<D>, state: &State<D>) -> Option<[f64; 2]> {
         let flags = self.flags(bonds, state)?;
         let share = |is: &dyn Fn(&Flags) -> bool| {
@@ -214,7 +217,7 @@ impl<const D: usize> StressEvaluator<D> {
     }
 }
 
-/// States of particles at a displacement.
+/// Computes the states of particles at a displacement.
 fn prepared<'a, const D: usize>(
     states: &'a Mutex<Pointwise<Solid<D>, D>>,
     bonds: &dyn Bonds<D>,

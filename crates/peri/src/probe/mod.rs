@@ -1,5 +1,5 @@
-//! Quantities of a body in a state: forces across sections, J-integrals and crack tips, motion of parts, fields along lines, and what
-//! follows from their histories.
+//! Quantities of a body in a state: forces across sections, J-integrals and crack tips, motion of parts,
+//! fields along lines, and quantities of their histories.
 
 mod crack;
 mod evaluator;

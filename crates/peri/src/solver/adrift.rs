@@ -1,9 +1,11 @@
-//! Loads without an equilibrium: parts of a body that bear a force and that nothing holds, and displacements far beyond the body.
+//! Loads without an equilibrium: parts of a body with a force and no support, and displacements far beyond
+//! the body.
 //!
-//! Intact bonds divide a body into parts. Supports prescribe single components, so that a part of which component d is nowhere prescribed
-//! bears no reaction along d: where its forces along d do not vanish it has no equilibrium at any displacement. Where every such sum
-//! vanishes, forces that do not follow the body leave its rotation a potential that is bounded, so that no other mechanism lacks an
-//! equilibrium: only translations are looked at. Contact pushes: a plane may hold what presses on it, a part held along d what lies behind it.
+//! Intact bonds divide a body into parts. Supports prescribe single components; a part of which component d
+//! is nowhere prescribed has no reaction along d, so if its forces along d do not vanish it has no
+//! equilibrium at any displacement. If every such sum vanishes, dead loads give its rotation a bounded
+//! potential, so that no other mechanism lacks an equilibrium: only translations are checked. Contact pushes:
+//! a plane may hold a part that presses on it, a part held along d may hold one behind it.
 
 use super::load::Loads;
 use super::scale::Scale;
@@ -15,21 +17,22 @@ use crate::field::Field;
 use std::collections::BTreeMap;
 use std::fmt;
 
-/// Displacement over the size of the body, or over the largest prescribed one, beyond which it is no equilibrium's.
+/// Displacement over the size of the body, or over the largest prescribed one, beyond which it is not an
+/// equilibrium.
 const FAR: f64 = 1e3;
 
-/// A part of a body, held together by intact bonds, whose forces along an axis nothing balances.
+/// A part of a body, connected by intact bonds, whose forces along an axis nothing balances.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Adrift {
-    /// Its particles.
+    /// Number of particles.
     pub particles: usize,
-    /// Particles of the body.
+    /// Number of particles of the body.
     pub of: usize,
-    /// Its middle in the reference configuration, m.
+    /// Middle of the part in the reference configuration, m.
     pub middle: Vec<f64>,
-    /// The axis.
+    /// Axis of the force.
     pub axis: &'static str,
-    /// Sum of its forces along the axis at load factor 1, N.
+    /// Sum of the part's forces along the axis at load factor 1, N.
     pub force: f64,
 }
 
@@ -38,7 +41,8 @@ impl fmt::Display for Adrift {
         let middle: Vec<String> = self.middle.iter().map(|x| format!("{:.4}", x * 1e3)).collect();
         write!(
             f,
-            "a part of {} of {} particles around X = ({}) mm bears {:.3e} N along {} at load factor 1, and nothing holds it along {}",
+            "a part of {} of {} particles around X = ({}) mm bears {:.3e} N along {} at load factor 1, \
+            and nothing holds it along {}",
             self.particles,
             self.of,
             middle.join(", "),
@@ -49,18 +53,18 @@ impl fmt::Display for Adrift {
     }
 }
 
-/// What may hold a part beside supports: it pushes.
+/// Contacts that may hold a part besides supports, by pushing.
 #[derive(Clone, Debug, Default)]
 pub struct Stops<const D: usize> {
     /// Normals of rigid planes, towards the body.
     pub normals: Vec<[f64; D]>,
-    /// Whether particles repel each other.
+    /// True if particles repel each other.
     pub pairs: bool,
-    /// Whether anything rubs: it may then hold along every axis.
+    /// True with friction, which may hold along every axis.
     pub rubs: bool,
 }
 
-/// What is known of a part.
+/// Forces and extent of a part.
 #[derive(Clone, Copy)]
 struct Piece<const D: usize> {
     particles: usize,
@@ -75,7 +79,8 @@ struct Piece<const D: usize> {
     extent: [[f64; 2]; D],
 }
 
-/// The first part of a body with forces along an axis that add up to more than `tolerance` of their sizes, and that nothing can hold.
+/// Finds the first part of a body whose forces along an axis sum to more than `tolerance` of their sizes and
+/// which nothing can hold.
 pub fn adrift<const D: usize>(
     bonds: &dyn BodyGeometry<D>,
     loads: &Loads<D>,
@@ -145,10 +150,10 @@ impl<const D: usize> System<'_, D> {
         Stops { normals, pairs: contact.has_pairs(), rubs: contact.rubs() || contact.is_tied() }
     }
 
-    /// Refuses parts that bear a force and that nothing holds; of a body with given forces only.
+    /// Refuses parts with a force and no support, in a body with dead loads only.
     ///
     /// # Errors
-    /// [`Error::NoEquilibrium`].
+    /// [`Error::NoEquilibrium`] for such a part.
     pub(super) fn refuse_adrift(&self, state: &State<D>, tolerance: f64) -> Result<(), Error> {
         if self.loads.body_force.is_none() || self.factors.is_empty() {
             return Ok(());
@@ -171,7 +176,7 @@ impl<const D: usize> System<'_, D> {
     /// Refuses a balance of forces at a displacement that only rounding can balance.
     ///
     /// # Errors
-    /// [`Error::NoEquilibrium`].
+    /// [`Error::NoEquilibrium`] beyond it.
     pub(super) fn refuse_far(&self, state: &State<D>) -> Result<(), Error> {
         if self.loads.body_force.is_none() {
             return Ok(());

@@ -1,4 +1,8 @@
-//! What is to be solved, and how: quasi-static equilibria or explicit dynamics.
+//! Solvers: the equations of a body, its loads, and methods for quasi-static equilibria or explicit dynamics.
+//!
+//! [`Lbfgs`] finds equilibria fastest and is the first choice; [`DynamicRelaxation`] finds the same
+//! equilibria by the method of most publications; [`VelocityVerlet`] computes explicit dynamics: impact,
+//! waves, running cracks.
 
 mod adr;
 mod adrift;

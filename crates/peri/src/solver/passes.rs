@@ -1,5 +1,5 @@
-//! The passes of an iteration over all sites: new forces with every sum over them, and the move of dynamic relaxation; the gradient of
-//! L-BFGS.
+//! Passes of an iteration over all sites: new forces with all sums over them; the move of dynamic relaxation;
+//! the gradient of L-BFGS.
 
 use super::load::Loads;
 use super::places::Places;
@@ -36,7 +36,7 @@ impl Sums {
     }
 }
 
-/// New forces and, in the same pass, all sums over them.
+/// Computes new forces and, in the same pass, all sums over them.
 pub fn force_pass<const D: usize>(
     system: &System<D>,
     state: &mut State<D>,
@@ -103,8 +103,8 @@ pub fn force_pass<const D: usize>(
     (sums, observed)
 }
 
-/// New forces, the gradient −V F of the energy over particles (0 where constrained), the sums over forces, the stretches, and the slope
-/// of the energy along a direction.
+/// Computes new forces, the gradient −V F of the energy over particles (0 where constrained), the sums over
+/// forces, the stretches, and the slope of the energy along a direction.
 pub fn gradient_pass<const D: usize>(
     system: &System<D>,
     state: &mut State<D>,
@@ -116,7 +116,7 @@ pub fn gradient_pass<const D: usize>(
     let (sites, loads, displacement) = (system.bonds.sites(), &*system.loads, &state.displacement);
     let direction = direction.components();
     let items = state.force.chunks_mut().into_par_iter().zip(places.parts_mut(gradient)).enumerate();
-    // one work item at a time where there are hardly any
+    // one work item at a time if there are hardly any
     let items = items.with_min_len(if sites <= 2 * CHUNK && D == 2 { 2 } else { 1 });
     let results: Vec<(Sums, StretchRange, f64)> = items
         .map(|(item, (mut force, gradient))| {
@@ -156,10 +156,10 @@ pub fn gradient_pass<const D: usize>(
     (sums, observed, slope)
 }
 
-/// Parts of a sum, so that it vectorises.
+/// Number of partial sums, so that a sum vectorises.
 pub const LANES: usize = 8;
 
-/// F becomes −V F; Σ F², and the sum of −V F along a direction.
+/// Replaces F by −V F; returns Σ F², and the sum of −V F along a direction.
 struct EnergyGradient<'a> {
     force: &'a mut [f64],
     volumes: &'a [f64],
@@ -195,7 +195,7 @@ impl NullaryFnOnce for EnergyGradient<'_> {
     }
 }
 
-/// The sum of the lanes, in their order.
+/// Sums the lanes in their order.
 #[inline(always)]
 pub fn sum(lanes: &[f64; LANES]) -> f64 {
     let mut sum = 0.0;
@@ -205,7 +205,7 @@ pub fn sum(lanes: &[f64; LANES]) -> f64 {
     sum
 }
 
-/// The sums over components that are all free, in eight interleaved parts so that they vectorise.
+/// Sums over components that are all free, in eight interleaved parts so that they vectorise.
 struct FreeSums<'a> {
     new: &'a [f64],
     old: &'a [f64],
@@ -243,7 +243,7 @@ impl NullaryFnOnce for FreeSums<'_> {
     }
 }
 
-/// v ← ((2 − c)v + 2F/M)/(2 + c), at rest v ← F/2M; u ← u + v; constrained components stay.
+/// Updates v ← ((2 − c)v + 2F/M)/(2 + c), at rest v ← F/2M; u ← u + v; constrained components stay.
 pub fn move_pass<const D: usize>(
     loads: &Loads<D>,
     state: &mut State<D>,
@@ -271,7 +271,8 @@ pub fn move_pass<const D: usize>(
     });
 }
 
-/// [`move_pass`] of a component of a work item. Where any is `held`, so are those with the `bit`.
+/// Runs [`move_pass`] over a component of a work item. If `held` is not empty, components with the `bit`
+/// stay.
 struct Move<'a> {
     f: &'a [f64],
     m: &'a [f64],
@@ -299,7 +300,7 @@ impl NullaryFnOnce for Move<'_> {
         }
         let held = &held[..count];
         for k in 0..count {
-            // a product with 0 or 1, no branch: v of what is held is and stays 0
+            // a product with 0 or 1 instead of a branch: v of held components stays 0
             let free = f64::from(u8::from(held[k] & bit == 0));
             v[k] = free * (keep * v[k] + push * f[k] / m[k]);
             u[k] += v[k];

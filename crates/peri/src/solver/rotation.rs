@@ -1,4 +1,4 @@
-//! Regions turned about an axis: prescribed along the arc, not in proportion to the load factor.
+//! Regions rotating about an axis: prescribed along the arc, not in proportion to the load factor.
 
 use super::load::Loads;
 use super::system::System;
@@ -10,18 +10,19 @@ use rayon::prelude::*;
 /// Particles of a region from which the first guess measures distances.
 const SAMPLES: usize = 256;
 
-/// A region that carries free particles: its turn, its displacement at load factor 1, m, and places of some of its particles.
+/// A region that carries free particles: its rotation, its displacement at load factor 1, m, and positions of
+/// some of its particles.
 type Carrier<'a, const D: usize> = (Option<&'a Turned<D>>, [f64; D], Vec<[f64; D]>);
 
 impl<const D: usize> Loads<D> {
-    /// Turns a region whose components are constrained already.
+    /// Rotates a region whose components are already constrained.
     pub fn turn(&mut self, bonds: &dyn BodyGeometry<D>, turned: Turned<D>) {
         self.turned.push(turned);
         self.set_rates(bonds, 0.0, 0.0);
     }
 
-    /// Has [`Loads::displacement`] of turned regions be the rate of their displacement over the load factor between two factors: the
-    /// secant, at one factor the tangent.
+    /// Sets [`Loads::displacement`] of rotating regions to the rate of their displacement over the load
+    /// factor between two factors: the secant, or the tangent at one factor.
     pub(super) fn set_rates(&mut self, bonds: &dyn BodyGeometry<D>, before: f64, after: f64) {
         let Some(field) = self.displacement.as_mut() else { return };
         for turned in &self.turned {
@@ -39,7 +40,7 @@ impl<const D: usize> Loads<D> {
         }
     }
 
-    /// Places turned regions at a load factor.
+    /// Sets the displacement of rotating regions at a load factor.
     pub(super) fn place_turned(&self, bonds: &dyn BodyGeometry<D>, factor: f64, displacement: &mut Field<D>) {
         for turned in &self.turned {
             for &site in &turned.sites {
@@ -49,7 +50,8 @@ impl<const D: usize> Loads<D> {
         }
     }
 
-    /// The longest arc of turned particles against those that are not, m; of regions turned both ways their sum.
+    /// Longest arc of rotating particles against the others, m; for regions rotating both ways, the sum of
+    /// both.
     pub(super) fn arc(&self, bonds: &dyn BodyGeometry<D>) -> f64 {
         let of = |turned: &Turned<D>| {
             let each = turned.sites.iter().map(|&site| turned.rotation.radius(bonds.position(site as usize)));
@@ -64,8 +66,8 @@ impl<const D: usize> Loads<D> {
         radius * (0..3).map(|d| span(d).powi(2)).sum::<f64>().sqrt()
     }
 
-    /// Moves free particles with the regions of prescribed displacement from a load factor to another, as near regions do: each turns a
-    /// particle by a part of its turn, the parts in proportion to 1/distance.
+    /// Moves free particles with the regions of prescribed displacement from one load factor to another: each
+    /// region rotates a particle by a fraction of its rotation, in proportion to 1/distance.
     pub(super) fn carry(
         &self,
         bonds: &dyn BodyGeometry<D>,
@@ -128,7 +130,7 @@ impl<const D: usize> Loads<D> {
 }
 
 impl<const D: usize> System<'_, D> {
-    /// [`Loads::set_rates`], where anything is turned.
+    /// Runs [`Loads::set_rates`] if any region rotates.
     pub(super) fn set_rates(&mut self, before: f64, after: f64) {
         if !self.loads.turned.is_empty() {
             self.loads.to_mut().set_rates(&*self.bonds, before, after);

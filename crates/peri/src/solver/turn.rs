@@ -1,21 +1,21 @@
-//! Turns about an axis, and regions that are turned.
+//! Rotations about an axis, and rotating regions.
 
 use crate::field::Field;
 use crate::geometry::length;
 
-/// A turn about an axis, of the whole angle at load factor 1.
+/// A rotation about an axis, of the whole angle at load factor 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rotation<const D: usize> {
     /// A point of the axis, m.
     pub centre: [f64; D],
-    /// Direction of the axis, of length 1; (0, 0, 1) in the plane.
+    /// Unit vector of the axis; (0, 0, 1) in the plane.
     pub axis: [f64; 3],
     /// Angle at load factor 1, rad.
     pub angle: f64,
 }
 
 impl<const D: usize> Rotation<D> {
-    /// Part of a vector across the axis, and n × of it.
+    /// Part of a vector across the axis, and n × this part.
     fn across(&self, from: [f64; D]) -> [[f64; D]; 2] {
         let n = self.axis;
         let r: [f64; 3] = std::array::from_fn(|d| from.get(d).copied().unwrap_or(0.0));
@@ -31,19 +31,19 @@ impl<const D: usize> Rotation<D> {
         std::array::from_fn(|d| sine * cross[d] - 2.0 * half * half * across[d])
     }
 
-    /// Displacement of a place X at a load factor, m.
+    /// Displacement of a position X at a load factor, m.
     pub fn displacement(&self, place: [f64; D], factor: f64) -> [f64; D] {
         self.turn(factor * self.angle, self.from(place))
     }
 
-    /// Its rate over the load factor, m: θ n × R(X − c).
+    /// Rate of the displacement over the load factor, m: θ n × R(X − c).
     pub(super) fn rate(&self, place: [f64; D], factor: f64) -> [f64; D] {
         let (from, moved) = (self.from(place), self.displacement(place, factor));
         let [_, cross] = self.across(std::array::from_fn(|d| from[d] + moved[d]));
         cross.map(|x| self.angle * x)
     }
 
-    /// Distance of a place from the axis, m.
+    /// Distance of a position from the axis, m.
     pub(super) fn radius(&self, place: [f64; D]) -> f64 {
         length(self.across(self.from(place))[0])
     }
@@ -53,18 +53,18 @@ impl<const D: usize> Rotation<D> {
     }
 }
 
-/// A region that is turned.
+/// A rotating region.
 #[derive(Clone, Debug)]
 pub struct Turned<const D: usize> {
-    /// About what.
+    /// Rotation of the region.
     pub rotation: Rotation<D>,
-    /// Displacement at load factor 1 beside it, m.
+    /// Additional displacement at load factor 1, m.
     pub shift: [f64; D],
     /// Bit d: component d is prescribed.
     pub components: u8,
-    /// Its place among [`Loads::held_regions`](super::Loads::held_regions).
+    /// Index of the region among [`Loads::held_regions`](super::Loads::held_regions).
     pub region: usize,
-    /// Its sites, less those that a later region holds.
+    /// Sites of the region that no later region holds.
     pub sites: Vec<u32>,
 }
 

@@ -1,4 +1,4 @@
-//! Stress in a cloud, whose bonds have no types.
+//! Stress in a cloud, whose bonds have no common offsets.
 
 use super::window::{Window, bond_function};
 use super::{BallVolume, Loaded, Measure, Tensor, ball_volume, force_over_length, segment_fraction};
@@ -22,7 +22,7 @@ pub fn piola<const D: usize>(
     in_balls(bonds, state, (measure, ball), &points, &grid)
 }
 
-/// The other measures: every particle looks for the bonds that cross its ball.
+/// Computes the other measures: every particle searches for the bonds that cross its ball.
 fn in_balls<const D: usize>(
     bonds: &CloudBonds<D>,
     state: &Loaded<D>,
@@ -49,7 +49,8 @@ fn in_balls<const D: usize>(
                     sum
                 })
                 .collect();
-            // what a lattice of the same mean spacing has in a whole ball: bodies thinner than that have no such ball
+            // bonds of a lattice of the same mean spacing in a whole ball: bodies thinner than that have no
+            // such ball
             let full = (Stencil::<D>::new(reach / bonds.spacing()).offsets.len() + 1) as f64;
             let full = full * bonds.spacing().powi(D as i32) * bonds.thickness();
             inside.into_iter().map(|v| whole * v / full).collect()
@@ -64,7 +65,7 @@ fn in_balls<const D: usize>(
         let mut add = |own: usize, weight_of: &dyn Fn([f64; D], [f64; D], usize) -> f64| {
             bonds.neighbours(own, &mut |bond| {
                 let p = std::array::from_fn(|d| points[own][d] - here[d]);
-                // not p + ξ: seen from the other end, both must be the same numbers or ties are counted twice or never
+                // not p + ξ: both ends must see the same numbers, or ties are counted twice or never
                 let q = std::array::from_fn(|d| points[bond.site][d] - here[d]);
                 let weight = weight_of(p, q, bond.site);
                 if weight > 0.0 {
@@ -86,7 +87,7 @@ fn in_balls<const D: usize>(
                 if distance_square(points[own], here) > reach * reach {
                     return;
                 }
-                // only the nearer end counts a bond
+                // a bond counts from the nearer end only
                 let nearer = |p, q, other| (norm(p), own) < (norm(q), other);
                 add(own, &|p, q, other| match measure {
                     // either end finds such a bond: half of its ½ from each
@@ -117,7 +118,8 @@ fn moment<const D: usize>(
     std::array::from_fn(|a| std::array::from_fn(|b| scale * (bond.bond[a] + eta[a]) * bond.bond[b]))
 }
 
-/// The measures whose weights sum to 1: P_p = Σ f V_I V_J ⊗ ξ B_p/(Σ_q V_q B_q) over the bonds, B_p the bond function in p's window.
+/// Measures whose weights sum to 1: P_p = Σ f V_I V_J ⊗ ξ B_p/(Σ_q V_q B_q) over the bonds, B_p the bond
+/// function in p's window.
 struct Shares<'a, const D: usize> {
     bonds: &'a CloudBonds<D>,
     state: &'a Loaded<'a, D>,
@@ -126,7 +128,7 @@ struct Shares<'a, const D: usize> {
     grid: &'a CellGrid<D>,
 }
 
-/// Particles about one, relative to it, whose windows its bonds may cross.
+/// Particles around one, relative to it, whose windows its bonds may cross.
 struct Around<const D: usize> {
     members: Vec<u32>,
     relative: [Vec<f64>; D],
@@ -136,7 +138,8 @@ struct Around<const D: usize> {
 }
 
 impl<const D: usize> Shares<'_, D> {
-    /// Bonds are shared out particle by particle; the shares are summed in the order of the particles, so that threads change no bit.
+    /// Distributes bonds particle by particle; the shares are summed in the order of the particles, so that
+    /// threads change no bit.
     fn stress(&self) -> Vec<Tensor<D>> {
         /// Particles whose shares are held at once: about 150 kB each in a solid at m = 4.
         const HELD: usize = 128;
@@ -169,7 +172,7 @@ impl<const D: usize> Shares<'_, D> {
         stress
     }
 
-    /// A bond and a ball end within 2δ.
+    /// Collects the particles around one: a bond and a ball end within 2δ.
     fn around(&self, own: usize) -> Around<D> {
         let (here, radius) = (self.points[own], self.bonds.horizon());
         let mut around = Around {
@@ -194,7 +197,7 @@ impl<const D: usize> Shares<'_, D> {
     }
 }
 
-/// What bonds of `own` give to each particle around it.
+/// Distributes the bonds of `own` over the particles around it.
 struct Given<'a, const D: usize> {
     shares: &'a Shares<'a, D>,
     own: usize,
@@ -243,7 +246,7 @@ impl<const D: usize> NullaryFnOnce for Given<'_, D> {
 }
 
 impl<const D: usize> Around<D> {
-    /// Part of the bond inside the ball of every particle: [`segment_fraction`], for all of them by vectors.
+    /// Fraction of the bond inside the ball of every particle: [`segment_fraction`], vectorised.
     #[inline(always)]
     fn fractions(&self, bond: [f64; D], parts: &mut [f64]) {
         let square: f64 = bond.iter().map(|x| x * x).sum();

@@ -1,5 +1,5 @@
-//! On a lattice the bond function depends on offsets only: each measure is, bond by bond of the stencil, a convolution
-//! of that bond's forces with fixed weights. The forces are the same for all measures.
+//! Stress on a lattice, where the bond function depends on offsets only: each measure is, bond by bond of the
+//! stencil, a convolution of that bond's forces with fixed weights. The forces are the same for all measures.
 
 use super::convolution::{Shared, Shares, Tap, tiles};
 use super::pull::forces;
@@ -10,11 +10,11 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-/// What a measure sums up, and what it took.
+/// Sums of a measure, and their run time.
 struct Sums<const D: usize> {
     measure: Measure,
     window: Option<Averaged<D>>,
-    /// Of each bond of half the stencil.
+    /// Taps of each bond of half the stencil.
     taps: Vec<Vec<Tap>>,
     shares: Shares<D>,
     seconds: f64,
@@ -31,7 +31,7 @@ impl<const D: usize> Sums<D> {
         Self { measure, window, taps, shares, seconds: started.elapsed().as_secs_f64() }
     }
 
-    /// The sums over the volumes.
+    /// Divides the sums by the volumes.
     fn finish(self, bonds: &LatticeBonds<D>, state: &Loaded<D>, ball: BallVolume) -> Measured<D> {
         let started = Instant::now();
         let volumes = volumes(bonds, state, self.measure, ball, self.window.as_ref());
@@ -43,7 +43,8 @@ impl<const D: usize> Sums<D> {
     }
 }
 
-/// One direction of every bond; the other adds the same f ⊗ ξ, which the factor ½ of the definition undoes.
+/// Returns one direction of every bond; the other adds the same f ⊗ ξ, which cancels the factor ½ of the
+/// definition.
 fn half<const D: usize>(bonds: &LatticeBonds<D>) -> &[[i32; D]] {
     let offsets = &bonds.stencil().offsets;
     &offsets[..offsets.len() / 2]
@@ -81,10 +82,10 @@ pub fn piolas<const D: usize>(
     all.into_iter().map(finish).collect()
 }
 
-/// Bond functions of offsets that are the same but for order and signs of their components.
+/// Bond functions of offsets that differ only in the order and signs of their components.
 type Alike<const D: usize> = BTreeMap<[i32; D], Vec<([i32; D], f64)>>;
 
-/// The bond function of an offset, from that of the one with ascending components, none of them negative.
+/// Bond function of an offset, from that of the equivalent one with ascending, non-negative components.
 fn bond_function<const D: usize>(
     window: &Averaged<D>,
     offset: [i32; D],
@@ -106,7 +107,7 @@ fn bond_function<const D: usize>(
     turned
 }
 
-/// The weights of a stencil bond for a measure.
+/// Weights of a stencil bond for a measure.
 fn taps<const D: usize>(
     bonds: &LatticeBonds<D>,
     offset: [i32; D],
@@ -127,7 +128,8 @@ fn taps<const D: usize>(
     weights.into_iter().map(|(start, weight)| Tap { shift: bonds.shift(start), weight }).collect()
 }
 
-/// Where a bond begins that crosses the ball about a particle, and the part of it inside (as printed: ½ with both ends there).
+/// Start of bonds that cross the ball about a particle, and the fraction inside (as printed: ½ with both ends
+/// there).
 fn crossing<const D: usize>(ratio: f64, offset: [i32; D], measure: Measure) -> Vec<([i32; D], f64)> {
     let square = ratio * ratio;
     let reach = 2 * ratio.ceil() as i32;
@@ -148,7 +150,7 @@ fn crossing<const D: usize>(ratio: f64, offset: [i32; D], measure: Measure) -> V
         .collect()
 }
 
-/// The sites of particles so near a surface that bonds of their windows are missing, where existing ones make up for them.
+/// Sites near a surface whose windows lack bonds, if existing bonds compensate for them.
 fn rim<const D: usize>(bonds: &LatticeBonds<D>, state: &Loaded<D>, measure: Measure) -> Vec<u32> {
     let wanted = |site: usize| match measure {
         Measure::HardyBonds => true,
@@ -157,7 +159,7 @@ fn rim<const D: usize>(bonds: &LatticeBonds<D>, state: &Loaded<D>, measure: Meas
     };
     // no bond that crosses a window begins farther away
     let reach = (bonds.ratio() + 0.5).floor() as i32 + bonds.ratio().floor() as i32;
-    // axis by axis: whether all within reach along it, and along those before, are occupied
+    // axis by axis: true if all within reach along it, and along previous axes, are occupied
     let mut whole = bonds.occupancy();
     for d in 0..D {
         let mut offset = [0; D];
@@ -175,7 +177,7 @@ fn rim<const D: usize>(bonds: &LatticeBonds<D>, state: &Loaded<D>, measure: Meas
     particles.filter(|&s| !whole[s as usize] && wanted(s as usize)).collect()
 }
 
-/// What the sum over bonds is divided by, particle by particle.
+/// Divisor of the sum over bonds, particle by particle.
 fn volumes<const D: usize>(
     bonds: &LatticeBonds<D>,
     state: &Loaded<D>,
@@ -207,7 +209,7 @@ fn volumes<const D: usize>(
     shares(bonds, &cells, shared).into_iter().map(|s| s * volume).collect()
 }
 
-/// Sum of the shares of the occupied cells around each particle; 1 where none is wanted or none is given.
+/// Sum of the shares of the occupied cells around each particle; 1 where unwanted or without shares.
 fn shares<const D: usize>(
     bonds: &LatticeBonds<D>,
     cells: &[([i32; D], f64)],

@@ -3,7 +3,7 @@
 use super::{Measure, segment_fraction};
 use rayon::prelude::*;
 
-/// Standard deviation of the Gaussian window over its radius, at which it is cut off.
+/// Standard deviation of the Gaussian window over its cut-off radius.
 const DEVIATION: f64 = 1.0 / 3.0;
 
 /// Shape of a localisation function.
@@ -20,7 +20,7 @@ pub enum Window {
 }
 
 impl Window {
-    /// The window of a measure that is a sum over bonds with a bond function.
+    /// Window of a measure that is a sum over bonds with a bond function.
     pub fn of(measure: Measure) -> Self {
         match measure {
             Measure::Gaussian => Self::Gaussian,
@@ -30,7 +30,8 @@ impl Window {
         }
     }
 
-    /// φ at a point, over its value at the centre; `radius` in the unit of `x`, the cell's edge for [`Self::Cell`].
+    /// φ at a point, over its value at the centre; `radius` in the unit of `x`, the cell's edge for
+    /// [`Self::Cell`].
     pub fn value<const D: usize>(self, x: [f64; D], radius: f64) -> f64 {
         let q = x.iter().map(|c| c * c).sum::<f64>().sqrt() / radius;
         let inside = match self {
@@ -47,20 +48,20 @@ impl Window {
     }
 }
 
-/// A window averaged over a cell of edge 1, tabulated on a grid finer than the cells. Its values at points one cell apart
-/// have the same sum wherever the points lie: a partition of unity over the lattice.
+/// A window averaged over a cell of edge 1, tabulated on a grid finer than the cells. Its values at points
+/// one cell apart have the same sum wherever the points lie: a partition of unity over the lattice.
 pub struct Averaged<const D: usize> {
-    /// Intervals a cell.
+    /// Intervals per cell.
     fine: usize,
     /// Cells from the centre to the table's ends.
     reach: usize,
-    /// Points a cell at which bond functions look, along the longest axis.
+    /// Points per cell at which bond functions are evaluated, along the longest axis.
     steps: usize,
     values: Vec<f64>,
 }
 
 impl<const D: usize> Averaged<D> {
-    /// The average of a window of `radius` cells.
+    /// Averages a window of `radius` cells.
     pub fn new(window: Window, radius: f64) -> Self {
         let radius = if window == Window::Cell { 1.0 } else { radius };
         let reach = (radius + 0.5).ceil() as usize + 1;
@@ -80,7 +81,7 @@ impl<const D: usize> Averaged<D> {
         2 * self.reach * self.fine
     }
 
-    /// The averaged window at a point, linear between nodes.
+    /// Averaged window at a point, linear between nodes.
     pub fn at(&self, x: [f64; D]) -> f64 {
         let side = self.side();
         let (mut base, mut part) = (0, [0.0; D]);
@@ -105,15 +106,15 @@ impl<const D: usize> Averaged<D> {
             .sum()
     }
 
-    /// Offsets p from which the bond p → p + `offset` meets the window, and the bond function B(p) = ∫₀¹ φ(p + α·offset) dα
-    /// there, over its sum: Σ B = 1.
+    /// Offsets p from which the bond p → p + `offset` meets the window, with the bond function B(p) = ∫₀¹
+    /// φ(p + α·offset) dα there, over its sum: Σ B = 1.
     pub fn bond_function(&self, offset: [i32; D]) -> Vec<([i32; D], f64)> {
         let mut found = self.raw_bond_function(offset);
         normalise(&mut found);
         found
     }
 
-    /// The same as it is: over the window's value at the centre.
+    /// Bond function over the window's value at the centre, not normalised.
     fn raw_bond_function(&self, offset: [i32; D]) -> Vec<([i32; D], f64)> {
         let reach = self.reach as i32;
         let low = offset.map(|o| -reach - o.max(0));
@@ -138,7 +139,7 @@ impl<const D: usize> Averaged<D> {
             .collect()
     }
 
-    /// The share of the window's volume in each cell around the centre.
+    /// Share of the window's volume in each cell around the centre.
     pub fn cells(&self) -> Vec<([i32; D], f64)> {
         let (reach, fine) = (self.reach as i32, self.fine);
         let across = (2 * reach + 1) as usize;
@@ -161,13 +162,14 @@ impl<const D: usize> Averaged<D> {
     }
 }
 
-/// The mean of a window of `radius` about the origin over the segment from `p` to `q`, Eq. (2.15), over its value at the centre.
+/// Mean of a window of `radius` about the origin over the segment from `p` to `q`, Eq. (2.15), over its value
+/// at the centre.
 pub fn bond_function<const D: usize>(window: Window, p: [f64; D], q: [f64; D], radius: f64) -> f64 {
     let inside = segment_fraction(p, q, radius * radius);
     if window == Window::Ball || inside == 0.0 {
         return inside;
     }
-    // the part inside the ball lies about the point nearest its centre, cut off by the ends
+    // the part inside the ball is symmetric about the point nearest its centre, cut off by the ends
     let edge: [f64; D] = std::array::from_fn(|d| q[d] - p[d]);
     let dot = |a: [f64; D], b: [f64; D]| (0..D).map(|d| a[d] * b[d]).sum::<f64>();
     let (length, nearest) = (dot(edge, edge), -dot(p, edge) / dot(edge, edge));
@@ -199,8 +201,8 @@ pub fn bond_function<const D: usize>(window: Window, p: [f64; D], q: [f64; D], r
     sum / unit
 }
 
-/// ∫ of the spline over the distance u along a line at the distance √`square` from the centre, 0 at u = 0; lengths over the radius.
-/// With r² = c² + u²: ∫r = ½(u r + c² arsinh(u/c)), ∫r³ = ¼(u r³ + 3 c² ∫r).
+/// ∫ of the spline over the distance u along a line at the distance √`square` from the centre, 0 at u = 0;
+/// lengths over the radius. With r² = c² + u²: ∫r = ½(u r + c² arsinh(u/c)), ∫r³ = ¼(u r³ + 3 c² ∫r).
 fn spline(u: f64, square: f64, inner: bool) -> f64 {
     let r = (square + u * u).sqrt();
     let log = if square > 0.0 { square * (u / square.sqrt()).asinh() } else { 0.0 };
@@ -218,8 +220,8 @@ pub fn normalise<T>(weights: &mut [(T, f64)]) {
     }
 }
 
-/// The average of `fine` samples along every axis. Samples lie between nodes: the cell about node i holds those from
-/// i − fine/2 on; nothing lies beyond the ends.
+/// Averages `fine` samples along every axis. Samples lie between nodes: the cell about node i holds those
+/// from i − fine/2 on; zero beyond the ends.
 fn averaged<const D: usize>(mut values: Vec<f64>, side: usize, fine: usize) -> Vec<f64> {
     for d in 0..D {
         let stride = side.pow(d as u32);
@@ -241,7 +243,8 @@ mod tests {
 
     const WINDOWS: [Window; 4] = [Window::Ball, Window::Gaussian, Window::Spline, Window::Cell];
 
-    /// Σ_p φ(p + x) over the lattice does not depend on x; without the average over the cell it does, by percents.
+    /// Checks that Σ_p φ(p + x) over the lattice does not depend on x; without the average over the cell it
+    /// does, by several percent.
     fn partition<const D: usize>(ratio: f64) {
         let far = ratio as i32 + 3;
         let side = (2 * far + 1) as usize;
@@ -273,8 +276,8 @@ mod tests {
         }
     }
 
-    /// So every bond has the same sum of weights before it is divided: that of the window over the cells. Solids of m = 3, 4
-    /// and 6, whose whole fields take long.
+    /// Every bond has the same sum of weights before it is divided: that of the window over the cells. Solids
+    /// of m = 3, 4 and 6, whose whole fields take long.
     #[test]
     fn weights_of_every_bond_sum_to_the_same() {
         for ratio in [3.015, 4.015, 6.015] {
@@ -295,7 +298,8 @@ mod tests {
         }
     }
 
-    /// Windows fall from their centre and vanish outside: (2.16), (2.17); along a bond their mean is that of many points.
+    /// Windows decrease from their centre and vanish outside: (2.16), (2.17); their mean along a bond is that
+    /// of many points.
     #[test]
     fn shapes_and_means_along_bonds() {
         for window in WINDOWS {

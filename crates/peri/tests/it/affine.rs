@@ -1,4 +1,5 @@
-//! The full network of chains: the battery of all materials, and closed forms of its moduli and of a dilation.
+//! The full network of chains: the battery of all materials, and closed forms of its moduli and of a
+//! dilation.
 
 use crate::materials::battery;
 use evidence::near;
@@ -38,7 +39,8 @@ fn energy(law: Affine, gradient: [[f64; 3]; 3]) -> f64 {
     law.energy(&family, &material.points()[middle])
 }
 
-/// Small strains have K, and Voigt's mean of both shear moduli of the lattice is μ: it depends on Σŵ(n·n)² = 1 alone.
+/// Small strains have K, and Voigt's mean of both shear moduli of the lattice is μ: it depends on Σŵ(n·n)² =
+/// 1 alone.
 #[test]
 fn small_strains_have_both_moduli() {
     let (bulk, step) = (20.0, 1e-3);

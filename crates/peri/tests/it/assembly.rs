@@ -2,8 +2,8 @@
 
 use std::process::Command;
 
-/// Vectors stored on the stack in each inner loop that evaluates bond laws, of the instructions (address and text) of a function:
-/// no jump or call in it, a packed division, ten packed multiply-adds or more.
+/// Vectors stored on the stack in each inner loop that evaluates bond laws, of the instructions (address and
+/// text) of a function: no jump or call in it, a packed division, ten packed multiply-adds or more.
 fn spills(function: &[(u64, &str)]) -> Vec<usize> {
     let jump = |text: &str| text.starts_with('j') || text.starts_with("call");
     let is_law = |body: &[(u64, &str)]| {
@@ -34,8 +34,8 @@ fn spills(function: &[(u64, &str)]) -> Vec<usize> {
     found
 }
 
-/// With AVX-512 no vector goes to the stack. With AVX2, which has 16 registers, at most four do: the components of ζ until the law is
-/// evaluated, the least and the largest stretch.
+/// With AVX-512 no vector goes to the stack. With AVX2, which has 16 registers, at most four do: the
+/// components of ζ until the law is evaluated, the least and the largest stretch.
 #[test]
 fn inner_loops_do_not_spill() {
     if !evidence::hosts::has_program("objdump") {

@@ -146,8 +146,8 @@ fn check_objectivity<const D: usize>(cells: [usize; D]) {
         let after = both(&mut built, &fit, &turned);
         for ((path, straight), (_, after)) in straight.into_iter().zip(after) {
             let expected: Vec<[f64; D]> = straight.iter().map(|&f| turn(&by, f)).collect();
-            // u ≈ 5 is rounded to 4e-16: strains of bonds of 0.1 to 1e-14, forces of strains 0.1 to 1e-13, times the
-            // bonds of a particle
+            // u ≈ 5 is rounded to 4e-16: strains of bonds of 0.1 to 1e-14, forces of strains 0.1 to 1e-13,
+            // times the bonds of a particle
             let apart = distance(&expected, &after) / rms(&straight);
             assert!(apart < 1e-11, "{path}, {D}D, {}: {apart:.1e}", law.name());
         }
@@ -222,8 +222,8 @@ fn check_gradient<const D: usize>(cells: [usize; D]) {
                 2.0 * MODULUS * volume * own.iter().map(of).sum::<f64>()
             };
             for d in 0..D {
-                // fourth-order differences: error h⁴ Π⁽⁵⁾ ≈ (1e-3)⁴ times the law's fifth derivative, and 1e-16/1e-3 of
-                // the energy for rounding
+                // fourth-order differences: error h⁴ Π⁽⁵⁾ ≈ (1e-3)⁴ times the law's fifth derivative, and
+                // 1e-16/1e-3 of the energy for rounding
                 let h = 1e-3 * 0.1;
                 let slope = (8.0 * (energy(d, h) - energy(d, -h)) - energy(d, 2.0 * h) + energy(d, -2.0 * h))
                     / (12.0 * h);

@@ -1,4 +1,5 @@
-//! One body in both representations, random displacements, and the plain sums of Eqs (2.6) and (2.47) to compare with.
+//! One body in both representations, random displacements, and the plain sums of Eqs (2.6) and (2.47) to
+//! compare with.
 
 use peri::bonds::{BodyGeometry, BondForces, Bonds, CloudBonds, LatticeBonds, VolumeCorrection, force};
 use peri::correction::surface_factors;
@@ -110,9 +111,11 @@ impl<const D: usize> Body<D> {
         Built { lattice, cloud, points, on_lattice, in_cloud }
     }
 
-    /// Pairs (I, J), I < J, with their reference bond and weight (volume × surface correction), by comparing all.
+    /// Pairs (I, J), I < J, with their reference bond and weight (volume × surface correction), by comparing
+    /// all.
     pub fn pairs(&self, points: &[[f64; D]]) -> Vec<Pair<D>> {
-        // the smallest gap between lattice distances near the horizons used here is far above this rounding margin
+        // the smallest gap between lattice distances near the horizons used here is far above this rounding
+        // margin
         let square = self.horizon().powi(2) * (1.0 + 1e-12);
         let mut pairs = Vec::new();
         for i in 0..points.len() {
@@ -257,7 +260,8 @@ pub fn relax<const D: usize>(
     solver.solve(&mut system, state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))
 }
 
-/// Prescribes the components `constrained` (bits) of the particles that `choose` picks at the displacements it gives.
+/// Prescribes the components `constrained` (bits) of the particles that `choose` picks at the displacements
+/// it gives.
 pub fn hold<const D: usize>(
     bonds: &dyn Bonds<D>,
     choose: impl Fn([f64; D]) -> Option<(u8, [f64; D])>,

@@ -1,4 +1,5 @@
-//! Solids of the mean deformation in irregular clouds: kernels against plain loops, the patch test, the order of convergence, a hole.
+//! Solids of the mean deformation in irregular clouds: kernels against plain loops, the patch test, the order
+//! of convergence, a hole.
 
 use crate::bodies::{Random, hold};
 use crate::materials::checks;
@@ -15,7 +16,8 @@ use peri::material::{Family, Material, NonlocalSolid, PointLaw, Pointwise, Respo
 use peri::solver::{Lbfgs, Method, State, System};
 use std::f64::consts::PI;
 
-/// A block of side^D cells of a spacing, each particle shifted by up to `jitter` of it along each axis, volumes random within ±`uneven`.
+/// A block of side^D cells of a spacing, each particle shifted by up to `jitter` of it along each axis,
+/// volumes random within ±`uneven`.
 struct Scattered {
     side: usize,
     spacing: f64,
@@ -98,8 +100,8 @@ fn both<const D: usize>(bonds: &CloudBonds<D>, site: usize, other: usize, mut na
     }
 }
 
-/// Kernels against plain loops, with and without θ: whole, with broken and softened bonds, then so few that particles have springs, or no
-/// bond at all.
+/// Kernels against plain loops, with and without θ: whole, with broken and softened bonds, then so few that
+/// particles have springs, or no bond at all.
 fn kernels_are_plain_loops<const D: usize>(space: Space, side: usize, correction: VolumeCorrection) {
     for relieved in [false, true] {
         let scattered = Scattered { uneven: 0.3, correction, ..Scattered::new(side, 0.25) };
@@ -176,7 +178,8 @@ fn bits_in_clouds_do_not_depend_on_threads() {
     assert!(found[0] == found[1]);
 }
 
-/// Forces and gradients of every particle are corr.py's, intact and with a cut (`docs/reference/correspondence/t_relieved.py`).
+/// Forces and gradients of every particle are corr.py's, intact and with a cut
+/// (`docs/reference/correspondence/t_relieved.py`).
 #[test]
 fn relieved_clouds_agree_with_an_independent_program() {
     let number = |text: &str| text.trim().parse::<f64>().unwrap();
@@ -224,7 +227,8 @@ fn relieved_clouds_agree_with_an_independent_program() {
     }
 }
 
-/// The largest force on a particle inside, over μ and the spacing, under a uniform F, and the largest error of F.
+/// The largest force on a particle inside, over μ and the spacing, under a uniform F, and the largest error
+/// of F.
 fn patch<L: PointLaw<D>, const D: usize>(
     bonds: &CloudBonds<D>,
     solid: NonlocalSolid<L>,
@@ -267,7 +271,8 @@ fn jittered_clouds_pass_the_patch_test() {
     }
 }
 
-/// Forces are slopes of the energy, to a part of 10⁹: intact, with 30 % of the bonds broken, and with some particles on springs.
+/// Forces are slopes of the energy, to a part of 10⁹: intact, with 30 % of the bonds broken, and with some
+/// particles on springs.
 fn slopes<const D: usize>(space: Space, side: usize, ratio: f64) {
     let mut bonds = Scattered { ratio, uneven: 0.2, ..Scattered::new(side, 0.2) }.build::<D>(true);
     let displacement = field(&bonds, displaced);
@@ -376,8 +381,8 @@ fn relieved_clouds_pass_the_battery() {
     println!("λmax(K)/s V in relieved clouds: {greatest:.3}; the bound is 2");
 }
 
-/// Manufactured finite deformation on clouds shifted by a fifth of the spacing: another cloud than the independent program's, whose errors
-/// are 4.7e-3, 3.0e-3, 1.3e-3 plain and 3.3e-3, 5.8e-4, 1.2e-4 relieved.
+/// Manufactured finite deformation on clouds shifted by a fifth of the spacing: another cloud than the
+/// independent program's, whose errors are 4.7e-3, 3.0e-3, 1.3e-3 plain and 3.3e-3, 5.8e-4, 1.2e-4 relieved.
 #[test]
 fn manufactured_deformations_of_clouds_converge() {
     let found = [false, true].map(|relieved| {
@@ -397,9 +402,10 @@ fn manufactured_deformations_of_clouds_converge() {
     at_most("cloud_manufactured_order_below_2", 2.0 - (found[1][1] / found[1][2]).log2(), 0.0);
 }
 
-/// A plate with a hole as rings of particles, Kirsch's displacements beyond three radii, plane strain, K/μ = 5/3: rms error of the stress
-/// beyond 1.5 radii over the remote one. The independent program has 0.01763 and 0.01622 plain, and with the correction in all families
-/// that no rim cuts 0.00954 and 0.00321 (0.0088 and 0.0029 with it from two horizons off the rim on).
+/// A plate with a hole as rings of particles, Kirsch's displacements beyond three radii, plane strain, K/μ =
+/// 5/3: rms error of the stress beyond 1.5 radii over the remote one. The independent program has 0.01763 and
+/// 0.01622 plain, and with the correction in all families that no rim cuts 0.00954 and 0.00321 (0.0088 and
+/// 0.0029 with it from two horizons off the rim on).
 #[test]
 fn rings_around_a_hole() {
     let found = [false, true].map(|relieved| [10, 20].map(|n| ring_error(n, relieved)));
@@ -457,7 +463,8 @@ fn ring_error(n: usize, relieved: bool) -> f64 {
     (sum / f64::from(count)).sqrt()
 }
 
-/// Kirsch's displacement and stress (xx, yy, xy) around a free hole of radius 1 under unit tension along x, μ = 1, K = 5/3.
+/// Kirsch's displacement and stress (xx, yy, xy) around a free hole of radius 1 under unit tension along x,
+/// μ = 1, K = 5/3.
 fn kirsch([x, y]: [f64; 2]) -> ([f64; 2], [f64; 3]) {
     let (poisson, t) = (0.25, y.atan2(x));
     let (k, q) = (3.0 - 4.0 * poisson, 1.0 / x.hypot(y));

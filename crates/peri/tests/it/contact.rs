@@ -1,5 +1,5 @@
-//! Contact: Macek & Silling (2007), doi:10.1016/j.finel.2007.08.012, against plain sums and closed forms; balance,
-//! energy, objectivity; bodies pressed together; no list in any bit.
+//! Contact: Macek & Silling (2007), doi:10.1016/j.finel.2007.08.012, against plain sums and closed forms;
+//! balance, energy, objectivity; bodies pressed together; no list in any bit.
 
 use crate::bodies::{Body, Built, MODULUS, Random, distance, norm, rms, scatter};
 use peri::bonds::{BodyGeometry, Bonds, CloudBonds, Overstretched, VolumeCorrection};
@@ -71,7 +71,8 @@ fn two_particles() {
     assert_eq!(contact(&near, &sites, &[[0.0; 2], [-1.0, 0.0]]), (vec![[0.0; 2]; 2], 0.0));
 }
 
-/// In one place (r = 0) the force is κcd/δ along the reference bond, at any distance from home; the other limits are 0.
+/// In one place (r = 0) the force is κcd/δ along the reference bond, at any distance from home; the other
+/// limits are 0.
 #[test]
 fn degenerate_states() {
     let points = [[0.0, 0.0, 0.0], [1.2, 0.0, 1.6]];
@@ -111,7 +112,8 @@ fn degenerate_states() {
     assert!(force.iter().flatten().all(|f| f.is_finite()) && energy > 0.0);
 }
 
-/// Large random displacements of a body with a hole and cracks: lattice and cloud against all pairs, in order.
+/// Large random displacements of a body with a hole and cracks: lattice and cloud against all pairs, in
+/// order.
 fn check_plainly<const D: usize>(cells: [usize; D]) {
     let body = Body::damaged(cells, 0.1, 2.015);
     let built = body.build();
@@ -202,8 +204,8 @@ fn broken_bonds_join_the_list() {
     check_parted([12, 9, 8]);
 }
 
-/// Two blocks that fly at each other, a spacing in five steps, and shake: the list is made where they meet, not all along the way,
-/// and the forces are at any time those of a list made then.
+/// Two blocks that fly at each other, a spacing in five steps, and shake: the list is made where they meet,
+/// not all along the way, and the forces are at any time those of a list made then.
 #[test]
 fn a_list_holds_while_bodies_fly() {
     let block = |low: f64| (0..36).map(move |k| [low + f64::from(k % 6), f64::from(k / 6)]);
@@ -336,8 +338,8 @@ fn contact_balances_has_an_energy_and_turns() {
     check_balance([9, 8, 7]);
 }
 
-/// Two rigid blocks, one cell apart across a cut, come closer by u: per column, pairs straight across (d = 0.9) and to
-/// either side (d = 0.9√2), as long as the next row (d = 1.35, 2 − u apart) does not touch.
+/// Two rigid blocks, one cell apart across a cut, come closer by u: per column, pairs straight across (d =
+/// 0.9) and to either side (d = 0.9√2), as long as the next row (d = 1.35, 2 − u apart) does not touch.
 #[test]
 fn force_over_penetration_of_rigid_blocks() {
     let columns = 40;

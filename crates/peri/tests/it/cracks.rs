@@ -1,4 +1,5 @@
-//! Cracks sever whole bonds: against exact arithmetic on whole numbers, wherever tips lie and in whichever order ends are given.
+//! Cracks sever whole bonds: against exact arithmetic on whole numbers, wherever tips lie and in whichever
+//! order ends are given.
 
 use crate::bodies::{Body, Built, MODULUS, Random, fit, forces, norm, stretch_range};
 use peri::bonds::{
@@ -35,7 +36,8 @@ fn crosses<const D: usize>(a: Whole<D>, b: Whole<D>, corner: Whole<D>, edges: &[
     })
 }
 
-/// Both representations of a box of cells, its cracks given in quarters of the spacing; every bond, from both ends.
+/// Both representations of a box of cells, its cracks given in quarters of the spacing; every bond, from both
+/// ends.
 fn check<const D: usize>(
     cells: [usize; D],
     (spacing, origin): (f64, f64),
@@ -122,8 +124,8 @@ proptest! {
     }
 }
 
-/// A sheet of 24 × 60 mm with a crack from (0, 30) to (6, 30) mm: 192 directed bonds cross it and 12 pass through its tip,
-/// of which rounding used to take 10, and forces did not sum to zero.
+/// A sheet of 24 × 60 mm with a crack from (0, 30) to (6, 30) mm: 192 directed bonds cross it and 12 pass
+/// through its tip, of which rounding used to take 10, and forces did not sum to zero.
 #[test]
 fn a_tip_on_bond_lines() {
     let body = Body::<2>::solid([24, 60], 1e-3, 3.015);

@@ -55,7 +55,8 @@ fn one_particle() {
     }
 }
 
-/// A particle that only damping slows: v = v₀(1 − ½cΔt)ⁿ/(1 + ½cΔt)ⁿ, to second order v₀e^(−ct), and what it loses is damped.
+/// A particle that only damping slows: v = v₀(1 − ½cΔt)ⁿ/(1 + ½cΔt)ⁿ, to second order v₀e^(−ct), and what it
+/// loses is damped.
 #[test]
 fn damping_slows() {
     let law = Law::Linear.build(1.0, 1.0, false).unwrap();
@@ -126,7 +127,8 @@ fn two_particles() {
             assert_eq!(state.counts.total_iterations, steps as u64);
             // the sharp critical step is that of the oscillator; differences of forces give it to 1e-9
             assert!((state.motion.limits.critical_step * omega / 2.0 - 1.0).abs() < 1e-8);
-            // and Gershgorin's theorem is sharp here, but for what the law's slope changes within the stretches covered
+            // and Gershgorin's theorem is sharp here, but for what the law's slope changes within the
+            // stretches covered
             assert!(
                 (state.motion.limits.gershgorin_step / state.motion.limits.critical_step - 1.0).abs() < 1e-8
             );
@@ -146,8 +148,8 @@ fn two_particles() {
     }
 }
 
-/// Kinetic + stored + released + damped = work, with ramps, supports, body forces, damping and breaking bonds; the error
-/// falls as Δt² where no bond breaks.
+/// Kinetic + stored + released + damped = work, with ramps, supports, body forces, damping and breaking
+/// bonds; the error falls as Δt² where no bond breaks.
 #[test]
 fn energies_balance() {
     let law = Law::ChainOffset.build(100.0, 1200.0, true).unwrap();
@@ -288,8 +290,8 @@ fn energy_does_not_drift() {
         (method, plain, state.work)
     };
     let (method, plain, work) = run(bonds, 0.1, 1e5, 1e-3);
-    // larger strains let it wander, without a trend, by O(Δt²·strain): 1.5e-5 at 0.02. Slope of the line of least squares
-    // times the duration
+    // larger strains let it wander, without a trend, by O(Δt²·strain): 1.5e-5 at 0.02. Slope of the line of
+    // least squares times the duration
     let drift = |values: &[f64]| {
         let (count, mean) = (values.len() as f64, values.iter().sum::<f64>() / values.len() as f64);
         let middle = 0.5 * (count - 1.0);
@@ -311,7 +313,8 @@ fn energy_does_not_drift() {
     }
 }
 
-/// A body turned by 90° in steps of 1° bears no force and no stress; one that spins keeps energy, momentum and spin.
+/// A body turned by 90° in steps of 1° bears no force and no stress; one that spins keeps energy, momentum
+/// and spin.
 #[test]
 fn rigid_rotation() {
     let law = Law::ChainOffset.build(100.0, 1200.0, true).unwrap();

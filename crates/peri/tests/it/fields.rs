@@ -1,4 +1,5 @@
-//! Parameters as fields over the particles: bars of two halves, whose strains and breaks are those of springs in series.
+//! Parameters as fields over the particles: bars of two halves, whose strains and breaks are those of springs
+//! in series.
 
 use crate::bodies::{Body, MODULUS, hold};
 use crate::linear_solid::LinearSolid;
@@ -61,8 +62,8 @@ fn a_constant_is_no_field() {
     assert_eq!(field.uniform(), Some(1.0));
 }
 
-/// Two halves of stiffness 1 and 3 carry one force: their strains are as 3 to 1, of bond laws on both paths, and of the
-/// state-based solid from outside the crate.
+/// Two halves of stiffness 1 and 3 carry one force: their strains are as 3 to 1, of bond laws on both paths,
+/// and of the state-based solid from outside the crate.
 #[test]
 fn halves_in_series() {
     let ratio = |bonds: &dyn Bonds<2>, state: &State<2>| {

@@ -1,5 +1,5 @@
-//! The filter of pressures: the battery of all materials, what it leaves as it is, and the roughness at corners of rigid grips as an
-//! independent program found it.
+//! The filter of pressures: the battery of all materials, what it leaves as it is, and the roughness at
+//! corners of rigid grips as an independent program found it.
 
 use crate::materials::battery;
 use evidence::{at_most, near};
@@ -62,8 +62,8 @@ fn a_homogeneous_deformation_is_left_as_it_is() {
     at_most("solid_filter_homogeneous", off / most, 1e-11);
 }
 
-/// rms difference of p/μ from the mean of the nearest neighbours, of a strip between rigid grips three layers deep, K/μ = 1000,
-/// stretched by a half in plane strain.
+/// rms difference of p/μ from the mean of the nearest neighbours, of a strip between rigid grips three layers
+/// deep, K/μ = 1000, stretched by a half in plane strain.
 fn roughness(rows: usize, filter: bool) -> f64 {
     const GRIP: usize = 3;
     let length = rows + 2 * GRIP;

@@ -1,4 +1,5 @@
-//! Coulomb friction and rigid planes: closed forms of a particle, a bar and a block on a plane, plain sums, balances.
+//! Coulomb friction and rigid planes: closed forms of a particle, a bar and a block on a plane, plain sums,
+//! balances.
 
 use crate::bodies::{Body, MODULUS, Random, Slit, hold, norm};
 use crate::dynamics::DENSITY;
@@ -70,8 +71,9 @@ fn equilibria(
     Ok((state, saved))
 }
 
-/// A particle of 1 kg on a plane inclined by `theta` with a penalty of 1e6 N/m, at rest across it: along the plane place and velocity
-/// at the end, and what the energies are off, J. The plane's normal is turned by 0.3 rad from the axes.
+/// A particle of 1 kg on a plane inclined by `theta` with a penalty of 1e6 N/m, at rest across it: along the
+/// plane place and velocity at the end, and what the energies are off, J. The plane's normal is turned by 0.3
+/// rad from the axes.
 struct Incline {
     theta: f64,
     mu: f64,
@@ -131,7 +133,8 @@ fn slides_down() {
     }
 }
 
-/// What sticks swings about its elastic slip mg sin θ/k_t by as much, and does not creep: as far after ten times the time.
+/// What sticks swings about its elastic slip mg sin θ/k_t by as much, and does not creep: as far after ten
+/// times the time.
 #[test]
 fn sticks_without_creep() {
     for (degrees, mu) in [(10.0_f64, 0.3), (20.0, 0.5), (20.0, 10.0)] {
@@ -162,7 +165,8 @@ fn stops_after() {
     }
 }
 
-/// On a belt a particle is dragged until it has the belt's velocity V; half of the belt's work mV² becomes heat.
+/// On a belt a particle is dragged until it has the belt's velocity V; half of the belt's work mV² becomes
+/// heat.
 #[test]
 fn belt_drags() {
     let incline = Incline { theta: 0.0, mu: 0.4, v0: 0.0, time: 1.0, step: 1e-4, belt: 1.5 };
@@ -180,7 +184,8 @@ fn belt_drags() {
     assert!(along.abs() <= 0.4 * G);
 }
 
-/// In equilibrium the drag of a belt grows as k_t U until it is μN, to rounding, whatever the number of steps.
+/// In equilibrium the drag of a belt grows as k_t U until it is μN, to rounding, whatever the number of
+/// steps.
 #[test]
 fn belt_in_equilibrium() {
     for (method, steps) in [(0, 4), (1, 4), (1, 16), (1, 64)] {
@@ -213,8 +218,9 @@ fn leg(from: f64, to: f64, steps: usize) -> impl Iterator<Item = f64> {
     (1..=steps).map(move |step| from + (to - from) * step as f64 / steps as f64)
 }
 
-/// A bar of stiffness EA = 1 and length 1 on a plane with the friction τ = 1 a length, pulled at one end to U = 0.18, back to −U and
-/// again to U: F(U) = √(2EAτU), F at 0 on the way back F_U − 2√(EAτU), a cycle takes 4F_U U/3, at any number of steps.
+/// A bar of stiffness EA = 1 and length 1 on a plane with the friction τ = 1 a length, pulled at one end to
+/// U = 0.18, back to −U and again to U: F(U) = √(2EAτU), F at 0 on the way back F_U − 2√(EAτU), a cycle takes
+/// 4F_U U/3, at any number of steps.
 #[test]
 fn strip_pulled_forth_and_back() {
     // lengths in cells, forces in units of the bonds' k = 6kθ, which is EA
@@ -246,8 +252,9 @@ fn strip_pulled_forth_and_back() {
     }
 }
 
-/// A particle on a spring k = 6kθV²/Δ over a plane that presses with N, loaded, unloaded and loaded again: both springs in series up to
-/// μN; over a cycle friction takes 4μN(U − μN/k') of it, and likewise of the held end.
+/// A particle on a spring k = 6kθV²/Δ over a plane that presses with N, loaded, unloaded and loaded again:
+/// both springs in series up to μN; over a cycle friction takes 4μN(U − μN/k') of it, and likewise of the
+/// held end.
 #[test]
 fn spring_over_a_plane() {
     let (mu, stiffness, deep, far) = (0.4, 30.0, 0.1, 0.5);
@@ -305,7 +312,8 @@ fn plane_hits_a_particle() {
     }
 }
 
-/// Peridigm's verification test Contact_Friction, Coulomb's law itself: two particles that repel each other and rub.
+/// Peridigm's verification test Contact_Friction, Coulomb's law itself: two particles that repel each other
+/// and rub.
 #[test]
 fn two_particles_of_peridigm() {
     let (side, modulus, reach, horizon) = (0.1612_f64, 1e12, 0.2, 0.6_f64);
@@ -333,7 +341,8 @@ fn two_particles_of_peridigm() {
     assert!((v[1] / -41.4843659641 - 1.0).abs() < 1e-8, "{v:?}");
 }
 
-/// Friction between particles against a plain sum over all pairs, of velocities, slips and bounds at random; Σ V f = 0.
+/// Friction between particles against a plain sum over all pairs, of velocities, slips and bounds at random;
+/// Σ V f = 0.
 fn friction_of_a_heap<const D: usize>(cells: [usize; D]) {
     let body = Body::<D>::solid(cells, 0.3, 1.015);
     let built = body.build();
@@ -396,7 +405,8 @@ fn friction_is_a_plain_sum() {
     friction_of_a_heap([6, 5, 4]);
 }
 
-/// Two halves of a sheet that collide askew over a rough plane that moves: on any number of threads, and from a state saved while they touch.
+/// Two halves of a sheet that collide askew over a rough plane that moves: on any number of threads, and from
+/// a state saved while they touch.
 #[test]
 fn neither_threads_nor_restarts_change_a_bit() {
     let mut body = Body::<2>::solid([66, 66], 1.0, 3.015);
@@ -458,8 +468,8 @@ fn neither_threads_nor_restarts_change_a_bit() {
     assert!(off(row).abs() < 1e-2 * row.work && row.rubbed > 0.0);
 }
 
-/// A row of five particles against a plane, F = u/(4/k + 1/s) with the bonds' k = 6kθV²/Δ and a plane of s and unit modulus: both
-/// quasi-static methods, planes that move and supports that move.
+/// A row of five particles against a plane, F = u/(4/k + 1/s) with the bonds' k = 6kθV²/Δ and a plane of s
+/// and unit modulus: both quasi-static methods, planes that move and supports that move.
 #[test]
 fn row_on_a_plane() {
     let (cells, ratio) = ([1, 5], 1.015);
@@ -509,8 +519,9 @@ fn row_on_a_plane() {
     }
 }
 
-/// Two blocks, one on the other and both on a rough plane, pressed and dragged: all that slides bears μN of the step itself; forces
-/// balance, and a run resumed within a step gives the same bits, on any number of threads.
+/// Two blocks, one on the other and both on a rough plane, pressed and dragged: all that slides bears μN of
+/// the step itself; forces balance, and a run resumed within a step gives the same bits, on any number of
+/// threads.
 #[test]
 fn dragged_over_a_plane() {
     let mut body = Body::<2>::solid([8, 8], 1.0, 3.015);
@@ -572,7 +583,8 @@ fn refuses() {
     assert!(fault(far).unwrap().contains("no face of the body within half a spacing"));
 }
 
-/// A plane through the middle of a body drives its two halves apart, in motion and at rest; everything stays finite.
+/// A plane through the middle of a body drives its two halves apart, in motion and at rest; everything stays
+/// finite.
 #[test]
 fn plane_through_a_body() {
     let mut built = Body::<2>::solid([12, 12], 1.0, 3.015).build();

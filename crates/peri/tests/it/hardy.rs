@@ -1,5 +1,5 @@
-//! Measures whose weights sum to 1: the patch test up to free edges, bonds shared out whole, the balance of momentum, and
-//! the definitions written out here.
+//! Measures whose weights sum to 1: the patch test up to free edges, bonds shared out whole, the balance of
+//! momentum, and the definitions written out here.
 
 use crate::bodies::{Body, Built, MODULUS, Pair, Random, fit, norm, scatter, stretch_range};
 use peri::bonds::{BodyGeometry, BondDamage, BondForces, Overstretched};
@@ -49,8 +49,8 @@ fn strained<const D: usize>(points: &[[f64; D]]) -> Vec<[f64; D]> {
     points.iter().map(|x| std::array::from_fn(|a| (0..D).map(|b| h(a, b) * x[b]).sum())).collect()
 }
 
-/// In a body with a hole every particle, at edges, corners and the hole, has the stress that its own bonds give where none
-/// is missing; the greatest error by `hardy`.
+/// In a body with a hole every particle, at edges, corners and the hole, has the stress that its own bonds
+/// give where none is missing; the greatest error by `hardy`.
 fn patch<const D: usize>(ratio: f64, cells: [usize; D], measures: &[Measure]) -> f64 {
     let mut body = Body::<D>::solid(cells, 1.0, ratio);
     let far = 2.0 * ratio;
@@ -101,7 +101,8 @@ fn any_strain_is_exact_up_to_free_edges() {
     evidence::at_most("patch test of hardy up to free edges", worst, 1e-13);
 }
 
-/// `patch_test.py`: σ₁₁ in rows 0–3 below an edge along x over that inside, uniform strain of uniaxial stress along x.
+/// `patch_test.py`: σ₁₁ in rows 0–3 below an edge along x over that inside, uniform strain of uniaxial stress
+/// along x.
 #[test]
 fn rows_below_a_free_edge() {
     let built = Body::<2>::solid([41, 30], 1.0, 3.015).build();
@@ -132,8 +133,8 @@ fn rows_below_a_free_edge() {
     assert!((mixed[0] - 0.897).abs() < 6e-4 && (mixed[1] - 1.0).abs() < 1e-12, "{mixed:?}");
 }
 
-/// Σ P V over all particles is Σ f ⊗ ξ over all bonds: every bond of an inner particle is shared out whole, and a broken one
-/// leaves exactly its own part, having counted with no force.
+/// Σ P V over all particles is Σ f ⊗ ξ over all bonds: every bond of an inner particle is shared out whole,
+/// and a broken one leaves exactly its own part, having counted with no force.
 #[test]
 fn a_broken_bond_counts_with_no_force() {
     let body = Body::<2>::solid([27, 27], 1.0, 3.015);
@@ -292,7 +293,8 @@ fn measures_are_their_definitions() {
         for (measure, window) in windows {
             let found = on_lattice(&built, &fit, &u, measure, Missing::Bonds)[particle];
             let exact = by_definition(&pairs, &built.points, &*law, &u, at, 48, &|x| averaged(window, x));
-            // both sample the window at sixteenths of a cell; the ball's rim is observed to about 1e-3 of its area
+            // both sample the window at sixteenths of a cell; the ball's rim is observed to about 1e-3 of its
+            // area
             let bound = 2e-3 * size(&exact);
             assert!(apart(&found, &exact) < bound, "{measure:?}: {found:?} against {exact:?}");
         }
@@ -303,8 +305,8 @@ fn measures_are_their_definitions() {
     }
 }
 
-/// div P is the window's average of the force density: Eqs (2.11), (2.12) for the cell's window of Lehoucq and Silling, and
-/// for the spline.
+/// div P is the window's average of the force density: Eqs (2.11), (2.12) for the cell's window of Lehoucq
+/// and Silling, and for the spline.
 #[test]
 fn divergence_is_the_average_over_the_window() {
     let (_, built, pairs, u) = smooth();
@@ -337,7 +339,8 @@ fn divergence_is_the_average_over_the_window() {
     }
 }
 
-/// Fields of one body do not depend on what lies in memory beside its rows: a body in a larger box of cells has the same.
+/// Fields of one body do not depend on what lies in memory beside its rows: a body in a larger box of cells
+/// has the same.
 #[test]
 fn rows_do_not_reach_into_each_other() {
     let (_, fit) = linear([0.5, 2.0]);

@@ -91,8 +91,8 @@ impl Plate {
     }
 }
 
-/// Issue 3 asks for a tenth of the work of dynamic relaxation at 1 mm; work there grows with the number of particles
-/// across, here hardly. `PLATE=1` in the environment measures 4, 2 and 1 mm (minutes).
+/// Issue 3 asks for a tenth of the work of dynamic relaxation at 1 mm; work there grows with the number of
+/// particles across, here hardly. `PLATE=1` in the environment measures 4, 2 and 1 mm (minutes).
 #[test]
 fn plate_with_a_hole() {
     let far = std::env::var_os("PLATE").is_some();
@@ -113,7 +113,8 @@ fn plate_with_a_hole() {
             start.elapsed().as_secs_f64() - middle
         );
         assert!(fast.convergence.residual <= 1e-5);
-        // the residual over the lowest eigenvalue (π/L)²: 1e-5 of the load is 1e-3 of the displacement at most
+        // the residual over the lowest eigenvalue (π/L)²: 1e-5 of the load is 1e-3 of the displacement at
+        // most
         let apart = apart(&plate.bonds, &fast, &slow);
         assert!(apart < 1e-3, "dx = {spacing}: {apart:.1e}");
         // measured: 18 to 20
@@ -128,7 +129,8 @@ fn damaged<const D: usize>(cells: [usize; D]) -> (Built<D>, f64) {
     (Body::<D>::damaged(cells, 0.125, 3.015).build(), 0.125 * cells[0] as f64 - 0.375)
 }
 
-/// Every stress-free law, stretches from far below to far above 1, on both representations and in both dimensions.
+/// Every stress-free law, stretches from far below to far above 1, on both representations and in both
+/// dimensions.
 #[test]
 fn same_equilibrium_as_relaxation() {
     fn check<const D: usize>(cells: [usize; D], most: u64) {
@@ -201,7 +203,8 @@ fn dent_through_breaking() {
     assert!(ratio > 2.0, "{ratio}");
 }
 
-/// Several work items and elements, so that threads have something to mix up; a lattice and a cloud, with breaking.
+/// Several work items and elements, so that threads have something to mix up; a lattice and a cloud, with
+/// breaking.
 #[test]
 fn bits_do_not_depend_on_threads() {
     let run = |threads: usize, cloud: bool| {
@@ -317,7 +320,8 @@ fn unstable_and_loose_bodies() {
     }
 }
 
-/// Bonds pulled past their greatest force, where the energy is not convex: whatever equilibrium is found is one.
+/// Bonds pulled past their greatest force, where the energy is not convex: whatever equilibrium is found is
+/// one.
 #[test]
 fn past_the_greatest_force() {
     // β e^{−β𝓛(β)/D̂} is greatest at β = 2.25 for D̂ = 2, where λ̄ = 1.53 with n̄ = 2
@@ -334,7 +338,8 @@ fn past_the_greatest_force() {
     assert!(stretch > 1.6 && state.convergence.residual <= 1e-4, "{stretch} {}", state.convergence.residual);
 }
 
-/// As dynamic relaxation in `limits.rs`: one particle, two, all constrained, a load that nothing bears, numbers that are none.
+/// As dynamic relaxation in `limits.rs`: one particle, two, all constrained, a load that nothing bears,
+/// numbers that are none.
 #[test]
 fn smallest_bodies_and_errors() {
     let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();

@@ -1,4 +1,5 @@
-//! Laws learnt from data as solids: the battery of all materials, homogeneous deformations, flags, and what is refused.
+//! Laws learnt from data as solids: the battery of all materials, homogeneous deformations, flags, and what
+//! is refused.
 
 use crate::bodies::{Body, scatter};
 use crate::materials::battery;
@@ -66,7 +67,8 @@ fn thickness(law: &Surrogate, mut c: Voigt) -> f64 {
     c[2]
 }
 
-/// Largest distance of P = FS from the law's own in any particle, over its norm, and the largest force at rest over μV/Δx.
+/// Largest distance of P = FS from the law's own in any particle, over its norm, and the largest force at
+/// rest over μV/Δx.
 fn distance<const D: usize>(
     law: &Surrogate,
     space: Space,
@@ -174,7 +176,8 @@ fn solve(text: &str, output: &Path) -> Finished {
     run(&source, &scene, &mut own).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// The field of a strip whose stretch in step k is 1 + 0.2 k: C₁₁ = 1.96 in step 2 and 2.56 in step 3; the box ends at 2.2219.
+/// The field of a strip whose stretch in step k is 1 + 0.2 k: C₁₁ = 1.96 in step 2 and 2.56 in step 3; the
+/// box ends at 2.2219.
 #[test]
 fn flags_are_a_field_and_a_warning() {
     let folder = tempfile::tempdir().unwrap();
@@ -233,7 +236,8 @@ fn laws_that_no_solid_can_have_are_refused() {
     );
 }
 
-/// S = C₀ : E with a shear modulus of 1 but in one plane, where it is −0.1: stiff in the mean over all directions.
+/// S = C₀ : E with a shear modulus of 1 but in one plane, where it is −0.1: stiff in the mean over all
+/// directions.
 struct Soft;
 
 impl Law for Soft {

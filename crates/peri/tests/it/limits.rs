@@ -12,7 +12,8 @@ use peri::material::BondMaterial;
 use peri::potential::{KernelFit, Law};
 use peri::solver::{DynamicRelaxation, Loads, Method, State};
 
-/// D̂ from 1 to 1e9 and n̄ from 2 to 1e6, every law, strains of a tenth: the fit keeps its bound and the forces follow.
+/// D̂ from 1 to 1e9 and n̄ from 2 to 1e6, every law, strains of a tenth: the fit keeps its bound and the
+/// forces follow.
 #[test]
 fn extreme_chains() {
     let body = Body::<2>::solid([9, 8], 0.125, 3.015);
@@ -324,7 +325,8 @@ fn what_does_not_converge_says_how_far_it_came() {
     assert!(matches!(error, Err(Error::NoEquilibrium { step: 0, torn: false, .. })), "{error:?}");
 }
 
-/// The network law, whose force grows without bound at both ends, squeezed and pulled; the fit follows the stretches.
+/// The network law, whose force grows without bound at both ends, squeezed and pulled; the fit follows the
+/// stretches.
 #[test]
 fn strong_compression_of_the_network_law() {
     let mut built = Body::<2>::solid([20, 20], 0.125, 3.015).build();
@@ -362,8 +364,8 @@ fn strong_compression_of_the_network_law() {
     }
 }
 
-/// One step to four times the length ends where four steps end, though its first stretches lie far outside the range
-/// that the law is first fitted for.
+/// One step to four times the length ends where four steps end, though its first stretches lie far outside
+/// the range that the law is first fitted for.
 #[test]
 fn a_leap_ends_where_steps_end() {
     let law = Law::ChainOffset.build(100.0, 1200.0, true).unwrap();

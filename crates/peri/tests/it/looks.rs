@@ -37,7 +37,8 @@ pictures = false
 fields = false
 "#;
 
-/// A body of which every particle turns by θ = 0.3 about the origin: the rotation is 0.3, strains are 0, and so are forces.
+/// A body of which every particle turns by θ = 0.3 about the origin: the rotation is 0.3, strains are 0, and
+/// so are forces.
 #[test]
 fn a_rotation_is_seen_as_one() {
     let directory = tempfile::tempdir().unwrap();
@@ -60,7 +61,8 @@ displacement_field = [\"(cos(0.3) - 1)*x - sin(0.3)*y\", \"sin(0.3)*x + (cos(0.3
     assert!(table.lines().next().unwrap().contains("turn [rad],gauge,end [m]"), "{table}");
 }
 
-/// A homogeneous strain prescribed at the rim reaches the inside (C. Cauchy–Born: a lattice follows it), and marks measure it.
+/// A homogeneous strain prescribed at the rim reaches the inside (C. Cauchy–Born: a lattice follows it), and
+/// marks measure it.
 #[test]
 fn a_strain_between_marks() {
     let directory = tempfile::tempdir().unwrap();
@@ -160,7 +162,8 @@ fn what_is_most_likely_not_meant() {
     );
     let here = torn("critical = { stretch = 600 }", 40);
     assert!(!never.contains("lie on body.cracks") && !never.contains("cuts out"), "{never}");
-    // 20 of the rows at y = 1 mm; of 28 neighbours within 3.015 spacings 6 lie along the crack, fewer at its ends
+    // 20 of the rows at y = 1 mm; of 28 neighbours within 3.015 spacings 6 lie along the crack, fewer at its
+    // ends
     let on = notes(
         &here
             .replace("-1 mm\", \"0 mm\"", "-1 mm\", \"1 mm\"")
@@ -177,7 +180,8 @@ fn what_is_most_likely_not_meant() {
     };
     // bonds end at a slot, unless they are asked for
     let bonded = |height: &str| notes(&slot(height).replace("shapes = [", "bond_gaps = true\nshapes = ["));
-    // rows at ±3 mm are two horizons' worth apart: three spacings, 6 mm of 6.03 mm; at 2.9 mm the rows at ±1 mm go
+    // rows at ±3 mm are two horizons' worth apart: three spacings, 6 mm of 6.03 mm; at 2.9 mm the rows at ±1
+    // mm go
     let narrow = bonded("2.9");
     assert!(
         narrow.contains(
@@ -277,8 +281,9 @@ fn workspace() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// The examples of `fields.md`, run as they stand on a file of many steps, read the last one. Needs a Python with h5py and VTK
-/// (`pip install h5py vtk`), named by `POLY_VTK_PYTHON` or found as `python3`; says so and passes where there is none.
+/// The examples of `fields.md`, run as they stand on a file of many steps, read the last one. Needs a Python
+/// with h5py and VTK (`pip install h5py vtk`), named by `POLY_VTK_PYTHON` or found as `python3`; says so and
+/// passes where there is none.
 #[test]
 fn examples_of_the_guide_read_the_last_step() {
     let python = std::env::var("POLY_VTK_PYTHON").unwrap_or_else(|_| "python3".into());

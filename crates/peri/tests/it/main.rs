@@ -1,5 +1,5 @@
-//! Tests of the public interface against plain sums, closed forms and the independent tables of `formulation.md`
-//! (chapter 2), whose scripts wrote `stress_patch.csv` and `stress_surface.csv`.
+//! Tests of the public interface against plain sums, closed forms and the independent tables of
+//! `formulation.md` (chapter 2), whose scripts wrote `stress_patch.csv` and `stress_surface.csv`.
 
 mod affine;
 #[cfg(target_arch = "x86_64")]

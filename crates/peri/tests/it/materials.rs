@@ -1,5 +1,5 @@
-//! One battery for every material: the five bond laws, by their kernels and by plain loops, and a state-based material from
-//! outside of the crate.
+//! One battery for every material: the five bond laws, by their kernels and by plain loops, and a state-based
+//! material from outside of the crate.
 
 use crate::bodies::{Body, Built, MODULUS, Random, laws, scatter};
 use crate::linear_solid::{LinearSolid, poisson_ratio};
@@ -75,7 +75,8 @@ impl<'a, 'm, const D: usize> Case<'a, 'm, D> {
             let [up, down] = [step, -step].map(|by| self.energy(&self.moved(site, axis, by)));
             let slope = (up - down) / (2.0 * step);
             let off = (force.get(site)[axis] + slope).abs() / scale;
-            // truncation (1e-4)²/6 of third derivatives, energies from tables of 1e-9, rounding of E over step·force
+            // truncation (1e-4)²/6 of third derivatives, energies from tables of 1e-9, rounding of E over
+            // step·force
             assert!(
                 off < 2e-6,
                 "{}, site {site}: {:?} against {slope}, {off:.1e}",
@@ -292,7 +293,8 @@ fn loops_agree_with_kernels() {
         for d in 0..2 {
             let pairs = found[0].0.components()[d].iter().zip(found[1].0.components()[d]);
             let apart = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / scale;
-            // the fit's bound of 1e-10 on every bond; of laws under stress at rest bonds cancel to a hundredth
+            // the fit's bound of 1e-10 on every bond; of laws under stress at rest bonds cancel to a
+            // hundredth
             assert!(apart < 1e-8, "{}: {apart:.1e}", law.name());
         }
         // tables of energies are within 1e-9 of the largest
@@ -328,8 +330,9 @@ fn the_linear_solid_has_its_bulk_modulus() {
     near("linear_solid_energy_space", density::<3>([5, 5, 4]), exact(3.0), 1e-12 * exact(3.0));
 }
 
-/// What the example prints: Poisson ratios that no bond law has. Along an axis the lattice's sums shear r times as stiffly as the
-/// continuum, r = 2Σ(x² − y²)²/|ξ|² / Σ|ξ|²: (K − rμ)/(K + rμ) up to the free edges, whose families miss a side.
+/// What the example prints: Poisson ratios that no bond law has. Along an axis the lattice's sums shear r
+/// times as stiffly as the continuum, r = 2Σ(x² − y²)²/|ξ|² / Σ|ξ|²: (K − rμ)/(K + rμ) up to the free edges,
+/// whose families miss a side.
 #[test]
 fn the_linear_solid_has_its_poisson_ratio() {
     let stencil = peri::bonds::Stencil::<2>::new(3.015);
@@ -352,8 +355,8 @@ enum Scheme {
     Verlet,
 }
 
-/// A plate of the linear solid in two work items, its right grip moved by 2 %, in dynamics within 1 s; `setting` is the tolerance, or
-/// the part of the critical time step.
+/// A plate of the linear solid in two work items, its right grip moved by 2 %, in dynamics within 1 s;
+/// `setting` is the tolerance, or the part of the critical time step.
 fn pulled(method: Scheme, setting: f64, threads: usize) -> State<2> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     let body = Body::<2>::solid([70, 50], 0.1, 3.015);
@@ -418,8 +421,8 @@ fn methods_agree_on_a_state_based_material() {
     assert!(coarse < 0.02 && fine < coarse / 6.0, "{coarse} {fine}");
 }
 
-/// A notched plate of the linear solid that tears: broken bonds take the energy that the whole body loses, and a resumed run
-/// from a saved state takes the same way to the last bit.
+/// A notched plate of the linear solid that tears: broken bonds take the energy that the whole body loses,
+/// and a resumed run from a saved state takes the same way to the last bit.
 #[test]
 fn a_state_based_material_tears() {
     let mut body = Body::<2>::solid([30, 24], 0.1, 3.015);

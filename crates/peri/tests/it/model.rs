@@ -102,7 +102,8 @@ fn any_material() {
     assert!(opening(1e-3) > 3.0 * opening(23e-3), "{} {}", opening(1e-3), opening(23e-3));
 }
 
-/// A law of the caller, whatever its scale, is the named one of the same shape; so is the stretch of a fracture energy.
+/// A law of the caller, whatever its scale, is the named one of the same shape; so is the stretch of a
+/// fracture energy.
 #[test]
 fn a_law_of_the_caller() {
     struct Springs(f64);

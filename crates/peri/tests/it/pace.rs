@@ -1,5 +1,5 @@
-//! The time step of explicit dynamics of solids: a bound of the greatest frequency at any stretch and with bonds broken, and steps that
-//! follow it through stretching, tearing, crushing and back.
+//! The time step of explicit dynamics of solids: a bound of the greatest frequency at any stretch and with
+//! bonds broken, and steps that follow it through stretching, tearing, crushing and back.
 
 use crate::bodies::{Random, hold};
 use evidence::{at_most, within};
@@ -53,8 +53,8 @@ fn some<const D: usize>(bonds: &dyn Bonds<D>, part: f64, random: &mut Random) ->
     list
 }
 
-/// The bound over ω², which the Lanczos iteration finds to 1 %, at stretches of 1 to 3 with 0, 20 and 50 % of the bonds broken and with
-/// particles displaced at random: least and greatest.
+/// The bound over ω², which the Lanczos iteration finds to 1 %, at stretches of 1 to 3 with 0, 20 and 50 % of
+/// the bonds broken and with particles displaced at random: least and greatest.
 fn tightness<const D: usize, M: Material<D> + 'static>(
     cells: [usize; D],
     material: impl Fn() -> M,
@@ -92,8 +92,9 @@ fn tightness<const D: usize, M: Material<D> + 'static>(
     found
 }
 
-/// What steps are made for is 1.3 ω² at least (the margin), and not much more: 16 times only in plane stress of finite K, where the law's own
-/// bound does not follow the thickness, and 40 times for the network, whose bound is that of Gershgorin with the stiffest neighbour.
+/// What steps are made for is 1.3 ω² at least (the margin), and not much more: 16 times only in plane stress
+/// of finite K, where the law's own bound does not follow the thickness, and 40 times for the network, whose
+/// bound is that of Gershgorin with the stiffest neighbour.
 #[test]
 fn frequencies_are_bounded_at_any_stretch_and_damage() {
     let judge = |name: &str, limit: f64, [least, most]: [f64; 2]| {
@@ -113,7 +114,8 @@ fn frequencies_are_bounded_at_any_stretch_and_damage() {
     judge("network_cube_2", 45.0, tightness(cube, || Affine::new(1.0, 25.0, 5.0 / 3.0).unwrap(), 0.5));
 }
 
-/// Pulls to three times the length within two passes of a wave, holds, and lets go: energies stay closed and the step comes back.
+/// Pulls to three times the length within two passes of a wave, holds, and lets go: energies stay closed and
+/// the step comes back.
 fn pulled<const D: usize, M: Material<D> + 'static>(name: &str, cells: [usize; D], material: M) {
     let mut bonds = block(cells);
     let length = cells[0] as f64;

@@ -56,8 +56,8 @@ fn touching<const D: usize>(state: &State<D>) -> ContactSummary {
     state.history.last().unwrap().contact.unwrap()
 }
 
-/// Two rows of five particles, one above the other, on linear bonds 6kθV²/Δ, pressed by u through the contact spring
-/// κ(6kθ/δ)V² with its gap of a tenth of a spacing: F = (u − 0.1Δ)/Σ 1/k, E = ½F(u − 0.1Δ).
+/// Two rows of five particles, one above the other, on linear bonds 6kθV²/Δ, pressed by u through the contact
+/// spring κ(6kθ/δ)V² with its gap of a tenth of a spacing: F = (u − 0.1Δ)/Σ 1/k, E = ½F(u − 0.1Δ).
 #[test]
 fn springs_in_series() {
     let mut body = Body::<2>::solid([1, 10], 1.0, 1.015);
@@ -105,9 +105,9 @@ fn springs_in_series() {
     }
 }
 
-/// Elastic blocks, separated by a cut, pressed together: no force until the gap of a tenth of a spacing closes, then
-/// both grips feel the same, growing with the approach, and the loads' work is stored. Particles are guided along y: the
-/// rows, which stand face to face, would slip aside, to the left or to the right.
+/// Elastic blocks, separated by a cut, pressed together: no force until the gap of a tenth of a spacing
+/// closes, then both grips feel the same, growing with the approach, and the loads' work is stored. Particles
+/// are guided along y: the rows, which stand face to face, would slip aside, to the left or to the right.
 #[test]
 fn elastic_blocks_press_each_other() {
     let mut body = Body::<2>::solid([24, 20], 1.0, 3.015);
@@ -175,8 +175,8 @@ fn bits<const D: usize>(state: &State<D>) -> Vec<u64> {
     numbers.map(f64::to_bits).chain([state.counts.total_iterations, state.fracture.broken]).collect()
 }
 
-/// A sheet with a crack of zero width across most of it, pressed upon and sheared by twice as much, so that the flanks
-/// slide over and into each other.
+/// A sheet with a crack of zero width across most of it, pressed upon and sheared by twice as much, so that
+/// the flanks slide over and into each other.
 fn sheet(cells: usize, down: f64) -> (Built<2>, impl Fn(&dyn Bonds<2>) -> Loads<2>) {
     let n = cells as f64;
     let mut body = Body::<2>::solid([cells, cells], 1.0, 3.015);
@@ -216,8 +216,8 @@ fn flanks_do_not_interpenetrate() {
                 );
                 touching.overlap
             });
-            // without it flanks pass through each other; with it they overlap by what presses them together over κ:
-            // a strain of 4/24 over 15, some three times that at the crack's ends
+            // without it flanks pass through each other; with it they overlap by what presses them together
+            // over κ: a strain of 4/24 over 15, some three times that at the crack's ends
             assert!(deepest[0] > 0.5 && deepest[1] < 0.25, "{deepest:?}");
         }
     }
@@ -263,7 +263,8 @@ fn neither_threads_nor_lists_nor_restarts_change_a_bit() {
     }
 }
 
-/// Where nothing touches, contact changes no bit, a mere look at what does never does, and none is built unless requested.
+/// Where nothing touches, contact changes no bit, a mere look at what does never does, and none is built
+/// unless requested.
 #[test]
 fn contact_without_touch_changes_no_bit() {
     let solve = |which: usize, contact: Option<[f64; 2]>| {

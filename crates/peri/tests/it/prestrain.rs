@@ -39,7 +39,8 @@ fn held<const D: usize>(cells: [usize; D], strain: [[f64; D]; D]) -> [[f64; D]; 
     stress
 }
 
-/// σ = −C:ε* but for the lattice's own stiffness: 1.025400 and 1.060602 in a sheet (ν = 1/3), 1.098710 and 0.956590 in a solid (ν = 1/4).
+/// σ = −C:ε* but for the lattice's own stiffness: 1.025400 and 1.060602 in a sheet (ν = 1/3), 1.098710 and
+/// 0.956590 in a solid (ν = 1/4).
 #[test]
 fn a_held_block() {
     let e = 1e-8;
@@ -148,14 +149,16 @@ fn bimetal([nx, ny]: [usize; 2]) -> f64 {
     2.0 * (n * xxy - s2 * y) / (n * s4 - s2 * s2) * top / SHRINKAGE.abs()
 }
 
-/// κH of 0.016005 and 0.015520 for ε* = −1 % in linear theory; displacements of second order are 1e-5 of it here.
+/// κH of 0.016005 and 0.015520 for ε* = −1 % in linear theory; displacements of second order are 1e-5 of it
+/// here.
 #[test]
 fn a_bimetal_strip() {
     near("prestrain_bimetal_8", bimetal([60, 8]), 1.600_450_345_685_163, 2e-4);
     near("prestrain_bimetal_16", bimetal([90, 16]), 1.552_044_917_312_378, 2e-4);
 }
 
-/// σ_xx over σ₀ in the rows of the middle of a free strip with the ε* = −S:σ of a stress σ_xx = σ₀(3s² − 1)/2, s from −1 to 1 across it.
+/// σ_xx over σ₀ in the rows of the middle of a free strip with the ε* = −S:σ of a stress σ_xx = σ₀(3s² −
+/// 1)/2, s from −1 to 1 across it.
 fn handed_over([nx, ny]: [usize; 2]) -> Vec<f64> {
     const STRESS: f64 = 1e-5;
     let mut built = Body::<2>::solid([nx, ny], 1.0, 3.015).build();
@@ -193,7 +196,8 @@ fn handed_over([nx, ny]: [usize; 2]) -> Vec<f64> {
     rows.into_iter().map(|(_, stress)| stress).collect()
 }
 
-/// Against a program of its own (docs/reference/print/stress_transfer.py); −0.4965 and 0.8785 of the continuum in the middle and in the outer row.
+/// Against a program of its own (docs/reference/print/stress_transfer.py); −0.4965 and 0.8785 of the
+/// continuum in the middle and in the outer row.
 #[test]
 fn a_stress_is_handed_over() {
     let rows = handed_over([120, 24]);
@@ -210,7 +214,8 @@ fn a_stress_is_handed_over() {
     }
 }
 
-/// A free body with a uniform ε* that is stretched beyond its rest breaks as one without: λ/λ* > λ_c, from both ends.
+/// A free body with a uniform ε* that is stretched beyond its rest breaks as one without: λ/λ* > λ_c, from
+/// both ends.
 #[test]
 fn prestrained_bonds_break() {
     let built = Body::<2>::solid([8, 7], 0.1, 3.015).build();

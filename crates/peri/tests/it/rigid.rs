@@ -1,4 +1,5 @@
-//! Bodies whose reactions vanish: moved by one grip, cut in two, without loads. A residual over reactions alone never converges.
+//! Bodies whose reactions vanish: moved by one grip, cut in two, without loads. A residual over reactions
+//! alone never converges.
 
 use crate::bodies::{Body, MODULUS, hold};
 use peri::bonds::{BodyGeometry, Bonds, LatticeBonds, VolumeCorrection};
@@ -66,8 +67,8 @@ fn a_body_moved_by_one_grip() {
     }
 }
 
-/// From a start in which the grip has torn away from the rest: the answer is as near to a rigid motion as the tolerance
-/// says, where reactions alone as a reference leave it 15 to 36 % away at 1e-3, or never end.
+/// From a start in which the grip has torn away from the rest: the answer is as near to a rigid motion as the
+/// tolerance says, where reactions alone as a reference leave it 15 to 36 % away at 1e-3, or never end.
 #[test]
 fn a_strained_start_comes_to_rest() {
     for (tolerance, most) in [(1e-3, 0.02), (1e-6, 2e-5)] {

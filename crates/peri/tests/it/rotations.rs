@@ -1,4 +1,5 @@
-//! Boundaries that turn along the arc: a twisted bar against the torsion of a neo-Hookean cylinder, bodies that turn as a whole.
+//! Boundaries that turn along the arc: a twisted bar against the torsion of a neo-Hookean cylinder, bodies
+//! that turn as a whole.
 
 use harness::case::{Case, Options, Run};
 use harness::scene::Source;
@@ -65,10 +66,11 @@ pictures = false
     )
 }
 
-/// M = μθ′πR⁴/2, exact for a neo-Hookean cylinder of constant length (Rivlin 1948), with the twist θ′ of the bar's middle: 1 % of particles
-/// on a lattice of a tenth of the diameter. θ′ is θ/L of a free length that reaches up to a spacing into each grip, as grips act over a
-/// horizon: at most 0.0206 N m at 60°. With the chord instead of the arc, steps before the last are squeezed; along the arc the largest
-/// stretch of every step is at most that of the last, 1.15.
+/// M = μθ′πR⁴/2, exact for a neo-Hookean cylinder of constant length (Rivlin 1948), with the twist θ′ of the
+/// bar's middle: 1 % of particles on a lattice of a tenth of the diameter. θ′ is θ/L of a free length that
+/// reaches up to a spacing into each grip, as grips act over a horizon: at most 0.0206 N m at 60°. With the
+/// chord instead of the arc, steps before the last are squeezed; along the arc the largest stretch of every
+/// step is at most that of the last, 1.15.
 #[test]
 fn a_bar_twisted_along_the_arc() {
     let turn = "rotation = { point = [\"0 mm\", \"0 mm\", \"0 mm\"], axis = [0, 0, 2], angle = \"60 deg\" }";
@@ -119,7 +121,8 @@ displacement = [\"0 mm\", \"0 mm\", \"free\"]";
     assert!(value(&free, "end") > 1e-5, "{} m", value(&free, "end"));
 }
 
-/// A body held at a region that turns once round turns with it: no bond is stretched in any step, and it ends where it began.
+/// A body held at a region that turns once round turns with it: no bond is stretched in any step, and it ends
+/// where it began.
 #[test]
 fn a_full_turn_strains_nothing() {
     let sheet = || Body::lattice(Shape::rectangle([0.0; 2], [20e-3, 8e-3]), 1e-3).plane_stress(1e-3);
@@ -152,8 +155,8 @@ fn a_full_turn_strains_nothing() {
     }
 }
 
-/// A ring between a fixed rim and a turned sleeve: M = 4πμ t θ/(1/a² − 1/b²) of small angles, with rims that lie up to a spacing within
-/// the grips.
+/// A ring between a fixed rim and a turned sleeve: M = 4πμ t θ/(1/a² − 1/b²) of small angles, with rims that
+/// lie up to a spacing within the grips.
 #[test]
 fn a_bushing_turned_in_its_plane() {
     let (inner, outer, thickness) = (10e-3_f64, 30e-3_f64, 1e-3);
@@ -173,8 +176,8 @@ fn a_bushing_turned_in_its_plane() {
     assert!(least < moment && moment < most, "{moment} N m, {least} to {most}");
 }
 
-/// In motion: the grip is where the factor puts it, and energy is conserved: work = kinetic + stored but for O(Δt²), a quarter of which
-/// half the time step leaves.
+/// In motion: the grip is where the factor puts it, and energy is conserved: work = kinetic + stored but for
+/// O(Δt²), a quarter of which half the time step leaves.
 #[test]
 fn a_strip_swung_by_its_grip() {
     let turn = Rotation { centre: [0.0; 2], axis: [0.0, 0.0, 1.0], angle: FRAC_PI_2 };

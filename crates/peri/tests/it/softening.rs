@@ -1,4 +1,5 @@
-//! Bonds of solids with a strength and a toughness: forces of softened bonds, strength, energies, resumed runs.
+//! Bonds of solids with a strength and a toughness: forces of softened bonds, strength, energies, resumed
+//! runs.
 
 use crate::bodies::{Body, Random, Slit, hold, scatter};
 use crate::solids::{Plain, displaced, neo_hooke, rubber};
@@ -68,7 +69,8 @@ fn forces<const D: usize>(
 /// A way to compute forces: its name, bonds, material and displacement.
 type Path<'a, const D: usize> = (&'a str, &'a dyn Bonds<D>, Box<dyn Response<D>>, Field<D>);
 
-/// At constant integrities forces are slopes of the energy and sum to zero, on lattices by kernels and by plain loops, and in clouds.
+/// At constant integrities forces are slopes of the energy and sum to zero, on lattices by kernels and by
+/// plain loops, and in clouds.
 fn slopes<const D: usize>(space: Space, cells: [usize; D]) {
     let body = Body::damaged(cells, 1.0, 3.015);
     let mut built = body.build();
@@ -121,8 +123,8 @@ fn forces_of_softened_bonds_are_slopes() {
     slopes::<3>(Space::Solid, [5, 5, 4]);
 }
 
-/// W at the strength: of small strains σ²/(2E) and in plane strain (1 − ν²)σ²/(2E); of an incompressible neo-Hookean sheet of
-/// nominal stress μ(λ − λ⁻²) it is ½μ(λ² + 2/λ − 3).
+/// W at the strength: of small strains σ²/(2E) and in plane strain (1 − ν²)σ²/(2E); of an incompressible
+/// neo-Hookean sheet of nominal stress μ(λ − λ⁻²) it is ½μ(λ² + 2/λ − 3).
 #[test]
 fn energies_at_a_strength() {
     let (bulk, small) = (5.0 / 3.0, 1e-4);
@@ -140,8 +142,8 @@ fn energies_at_a_strength() {
     assert!(energy_at_strength(&long, 1e9).is_none());
 }
 
-/// A strip of small strains, 3 grips long, pulled at its ends: peak of the mean stress over the strength. Bonds that end in the
-/// middle row have softened to `weak` beforehand.
+/// A strip of small strains, 3 grips long, pulled at its ends: peak of the mean stress over the strength.
+/// Bonds that end in the middle row have softened to `weak` beforehand.
 fn strip(rows: usize, ductility: f64, weak: f64) -> f64 {
     let spacing = 1.0 / rows as f64;
     let body = Body::<2>::solid([3 * rows, rows], spacing, 3.015);
@@ -243,7 +245,8 @@ fn tear(moving: bool, start: Option<&State<2>>, saved: &mut Vec<State<2>>) -> St
     state
 }
 
-/// Energies balance while a strip tears, softening included, and a run resumed from any saved state takes the same way to the last bit.
+/// Energies balance while a strip tears, softening included, and a run resumed from any saved state takes the
+/// same way to the last bit.
 #[test]
 fn a_softening_strip_tears() {
     for moving in [true, false] {
@@ -277,8 +280,9 @@ fn a_softening_strip_tears() {
     }
 }
 
-/// In a uniform state every bond of every particle releases Y = W: under several stresses the strength of softening bonds is the surface
-/// W = Y₀. Small strains at ν = 0.4995: an equibiaxial strength of σ_ts/√(2(1 − ν)), and a hydrostatic one of σ_ts/√(3(1 − 2ν)) = 18.3 σ_ts.
+/// In a uniform state every bond of every particle releases Y = W: under several stresses the strength of
+/// softening bonds is the surface W = Y₀. Small strains at ν = 0.4995: an equibiaxial strength of σ_ts/√(2(1
+/// − ν)), and a hydrostatic one of σ_ts/√(3(1 − 2ν)) = 18.3 σ_ts.
 #[test]
 fn the_strength_surface_is_one_of_equal_energy() {
     let poisson = 0.4995_f64;

@@ -1,5 +1,5 @@
-//! Solids with any Poisson ratio: the battery of all materials, the state of every particle as an independent program wrote it
-//! (`docs/reference/correspondence`; `solid_*.csv`, 13 digits), and closed forms.
+//! Solids with any Poisson ratio: the battery of all materials, the state of every particle as an independent
+//! program wrote it (`docs/reference/correspondence`; `solid_*.csv`, 13 digits), and closed forms.
 
 use crate::bodies::{Body, Random, scatter};
 use crate::materials::battery;
@@ -105,7 +105,8 @@ impl<const D: usize> Block<D> {
         self.bonds.sever(&list);
     }
 
-    /// The largest differences of f, F, W and I from the program's, over the largest of each; ΣE over all particles.
+    /// The largest differences of f, F, W and I from the program's, over the largest of each; ΣE over all
+    /// particles.
     fn compare<L: PointLaw<D> + Clone>(
         &mut self,
         solid: &NonlocalSolid<L>,
@@ -185,8 +186,8 @@ fn every_particle_agrees_with_an_independent_program() {
     }
 }
 
-/// A neo-Hookean network is the same solid by both ways: W_S = ½μ is the constant stabilisation of correspondence. With n → ∞
-/// the chains have μ(I₁) = μ₀ up to 1/n.
+/// A neo-Hookean network is the same solid by both ways: W_S = ½μ is the constant stabilisation of
+/// correspondence. With n → ∞ the chains have μ(I₁) = μ₀ up to 1/n.
 #[test]
 fn long_chains_are_neo_hookean() {
     let body = Body::<2>::damaged([9, 8], 1.0, 3.015);
@@ -280,7 +281,8 @@ fn free_sides_follow_the_bulk_modulus() {
     }
 }
 
-/// F and S are exact in every particle of a homogeneous deformation, edges, holes and cracks included, and rest has no force.
+/// F and S are exact in every particle of a homogeneous deformation, edges, holes and cracks included, and
+/// rest has no force.
 #[test]
 fn a_homogeneous_deformation_is_exact_everywhere() {
     let body = Body::<2>::damaged([14, 13], 0.1, 3.015);
@@ -320,9 +322,10 @@ fn a_homogeneous_deformation_is_exact_everywhere() {
     }
 }
 
-/// A strip bonded to plates, w/h = 4, pressed by 1 %: finite elements (`docs/reference/eight_chain/strip.py`) have 2.913μ at K/μ = 5/3 and 16.49μ
-/// at 100, where all of the stiffness comes from the volume. Plates of particles give way over a horizon, so that errors are of
-/// first order: 12.6 % and 6.9 % at 16 particles over the height, half of the former beyond.
+/// A strip bonded to plates, w/h = 4, pressed by 1 %: finite elements (`docs/reference/eight_chain/strip.py`)
+/// have 2.913μ at K/μ = 5/3 and 16.49μ at 100, where all of the stiffness comes from the volume. Plates of
+/// particles give way over a horizon, so that errors are of first order: 12.6 % and 6.9 % at 16 particles
+/// over the height, half of the former beyond.
 #[test]
 fn a_bonded_strip_is_stiff_because_it_keeps_its_volume() {
     let (height, shear) = (8e-3, 0.4e6);
@@ -401,7 +404,8 @@ impl<const D: usize, M: Material<D>> Material<D> for Plain<M> {
     }
 }
 
-/// The kernels against plain loops: a body with a hole, whole, cut, and severed until particles have springs or no bond at all.
+/// The kernels against plain loops: a body with a hole, whole, cut, and severed until particles have springs
+/// or no bond at all.
 fn kernels_are_plain_loops<const D: usize>(space: Space, side: usize, volume: VolumeCorrection) {
     let mut body = vec![Operation::Add(Shape::Box { min: [0.0; D], max: [side as f64; D] })];
     body.push(Operation::Cut(Shape::Ball { centre: [0.5 * side as f64; D], radius: 1.6 }));

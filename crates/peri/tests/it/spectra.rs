@@ -1,5 +1,6 @@
-//! Spectra and manufactured solutions of solids: modes of free blocks, plane waves in the infinite lattice, and the order of
-//! convergence at finite strains, against an independent program (`docs/reference/correspondence`) and closed forms.
+//! Spectra and manufactured solutions of solids: modes of free blocks, plane waves in the infinite lattice,
+//! and the order of convergence at finite strains, against an independent program
+//! (`docs/reference/correspondence`) and closed forms.
 
 use evidence::{at_most, near};
 use peri::bonds::{BodyGeometry, Bonds, LatticeBonds, VolumeCorrection};
@@ -70,8 +71,8 @@ fn modes<const D: usize>(cells: [usize; D], space: Space, bulk: f64, stabilisati
     values
 }
 
-/// Rigid motions and no other mode are free, and the softest one has the independent program's frequency: counting modes
-/// would not see those that a weak stabilisation leaves nearly free.
+/// Rigid motions and no other mode are free, and the softest one has the independent program's frequency:
+/// counting modes would not see those that a weak stabilisation leaves nearly free.
 #[test]
 fn free_blocks_have_rigid_modes_and_no_soft_ones() {
     let judge = |name: &str, values: &[f64], rigid: usize, first: f64| {
@@ -96,8 +97,8 @@ fn free_blocks_have_rigid_modes_and_no_soft_ones() {
     judge("5x4x3", &modes([5, 4, 3], Space::Solid, 5.0 / 3.0, 1.0), 6, 0.425515);
 }
 
-/// ρω² of a plane wave cos(k·(x − x₀)), displaced along `along`, in the infinite lattice: the force at x₀, the middle of a block whose
-/// surface is too far away to matter.
+/// ρω² of a plane wave cos(k·(x − x₀)), displaced along `along`, in the infinite lattice: the force at x₀,
+/// the middle of a block whose surface is too far away to matter.
 fn symbol<const D: usize>(number: [f64; D], along: usize, bulk: f64, stabilisation: f64) -> f64 {
     // two horizons on either side
     let bonds = block([13; D], 1.0);
@@ -125,8 +126,8 @@ fn along_x<const D: usize>(wave: f64, along: usize, bulk: f64, stabilisation: f6
     symbol::<D>(number, along, bulk, stabilisation)
 }
 
-/// A checkerboard has no mean deformation: the stabilisation alone resists it, by s Δx² = 1.7269841270 (plane) and 1.6524590164 (space)
-/// times a g.
+/// A checkerboard has no mean deformation: the stabilisation alone resists it, by s Δx² = 1.7269841270
+/// (plane) and 1.6524590164 (space) times a g.
 #[test]
 fn checkerboards_have_the_stiffness_of_the_stabilisation() {
     for a in [0.1, 1.0, 4.0] {
@@ -136,8 +137,8 @@ fn checkerboards_have_the_stiffness_of_the_stabilisation() {
     }
 }
 
-/// ρω²/(E_w k²) − 1 = −D m₄ k²(1/3 − a g/(4E_w)) for long waves, m₄ = Σωξ₁⁴; and the speed of shear waves of 16 particles a
-/// length.
+/// ρω²/(E_w k²) − 1 = −D m₄ k²(1/3 − a g/(4E_w)) for long waves, m₄ = Σωξ₁⁴; and the speed of shear waves of
+/// 16 particles a length.
 #[test]
 fn waves_have_the_dispersion_of_the_theory() {
     fn coefficient<const D: usize>(along: usize, bulk: f64, a: f64) -> (f64, f64) {
@@ -189,8 +190,8 @@ fn derivative<const N: usize>(
 /// Particles over the width of a collar that has the manufactured displacement.
 pub const COLLAR: usize = 8;
 
-/// Root mean square errors of u and of K(J − J₀)/μ inside of the collar, n particles over the edge of 1, in the block from the
-/// origin on.
+/// Root mean square errors of u and of K(J − J₀)/μ inside of the collar, n particles over the edge of 1, in
+/// the block from the origin on.
 pub fn errors(bonds: &mut dyn Bonds<2>, n: usize, bulk: f64, volume: f64) -> [f64; 2] {
     let law = neo_hooke::<2>(Space::PlaneStrain, bulk, 1.0);
     let width = COLLAR as f64 / n as f64;
@@ -245,8 +246,8 @@ pub fn errors(bonds: &mut dyn Bonds<2>, n: usize, bulk: f64, volume: f64) -> [f6
     sums.map(|sum| (sum / inside.len() as f64).sqrt())
 }
 
-/// Second order at finite strains and no locking at K/μ = 1000, in displacement and pressure: the independent program's errors, to
-/// their digits.
+/// Second order at finite strains and no locking at K/μ = 1000, in displacement and pressure: the independent
+/// program's errors, to their digits.
 #[test]
 fn manufactured_deformations_converge_with_second_order() {
     let table = [

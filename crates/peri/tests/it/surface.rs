@@ -69,8 +69,9 @@ fn plate(spacing: f64, volume: VolumeCorrection, surface: bool) -> [f64; 3] {
     [strain / stress, hardy, one_point]
 }
 
-/// formulation.md: the correction takes the global modulus' error from 20.6 % to 3.4 %, volume factor on (as printed:
-/// ± 0.001); hardy 2.47 and one-point 2.64 at dx = 5 with the surface correction, volume factor off (± 1 %).
+/// formulation.md: the correction takes the global modulus' error from 20.6 % to 3.4 %, volume factor on (as
+/// printed: ± 0.001); hardy 2.47 and one-point 2.64 at dx = 5 with the surface correction, volume factor off
+/// (± 1 %).
 #[test]
 fn correction_on_the_plate() {
     let [strain, ..] = plate(0.005, VolumeCorrection::Linear, false);

@@ -1,5 +1,6 @@
-//! Fracture energies of bond laws: the lattice's bonds across a cut, against the sums of formulation-tearing.md (its tables and
-//! `fit.py`), the critical stretches of both conventions, the area of new cracks, and bonds that soften.
+//! Fracture energies of bond laws: the lattice's bonds across a cut, against the sums of
+//! formulation-tearing.md (its tables and `fit.py`), the critical stretches of both conventions, the area of
+//! new cracks, and bonds that soften.
 
 use evidence::near;
 use harness::scene::Source;
@@ -100,8 +101,8 @@ fn context<'a>(law: &'a dyn BondPotential, bonds: &LatticeBonds<2>, youngs: f64)
     }
 }
 
-/// Of a linear law λ_c − 1 goes with √G: by `bonds` it is that of Silling and Askari (√(4πG/(9Eδ)) in plane stress), by
-/// `tearing` √c times smaller; by `softening` the energy is e_f times that up to the onset.
+/// Of a linear law λ_c − 1 goes with √G: by `bonds` it is that of Silling and Askari (√(4πG/(9Eδ)) in plane
+/// stress), by `tearing` √c times smaller; by `softening` the energy is e_f times that up to the onset.
 #[test]
 fn critical_stretches_of_the_conventions() {
     let law = Law::Linear.build(0.0, 0.0, false).unwrap();
@@ -122,7 +123,8 @@ fn critical_stretches_of_the_conventions() {
     near("softening_energy", fracture_energy(&context, Convention::Softening, end) / 80.0, 1.0, 1e-9);
 }
 
-/// By `bonds` the critical stretch has the bits that it had before there were conventions (pure-shear-bond-law.toml of the inputs, run by that build).
+/// By `bonds` the critical stretch has the bits that it had before there were conventions
+/// (pure-shear-bond-law.toml of the inputs, run by that build).
 #[test]
 fn bonds_are_what_they_were() {
     let law = Law::Linear.build(0.0, 0.0, false).unwrap();
@@ -151,7 +153,8 @@ fn softened_bonds() {
     assert_eq!([integrity(onset(end) - 1e-12, end), integrity(end, end)], [1.0, 0.0]);
 }
 
-/// Forces of a body with soft bonds are slopes of its energy, in the kernels of a lattice and of a cloud, and sum to zero.
+/// Forces of a body with soft bonds are slopes of its energy, in the kernels of a lattice and of a cloud, and
+/// sum to zero.
 #[test]
 fn forces_of_soft_bonds_are_slopes() {
     let lattice = sheet(3.015, VolumeCorrection::None);
@@ -217,8 +220,8 @@ fn part<const D: usize>(bonds: &mut dyn Bonds<D>, n: [f64; D], at: f64) {
     bonds.sever(&list);
 }
 
-/// The area of a plane crack through a body: along an axis all but the half diagonals that miss at both ends, at 45° and in
-/// space to 3 %; of single bonds that break none.
+/// The area of a plane crack through a body: along an axis all but the half diagonals that miss at both ends,
+/// at 45° and in space to 3 %; of single bonds that break none.
 #[test]
 fn areas_of_cracks() {
     let columns = 40.0;

@@ -50,8 +50,9 @@ fn steps_beyond_the_critical_are_refused() {
     assert!(matches!(error, Error::NotFinite { quantity: "velocity", .. }), "{error}");
 }
 
-/// A block of the `chain-affine` law, which stiffens without bound, crushed between its ends: at a fixed step just below what is
-/// critical at rest the growth is named before anything is infinite; the automatic step follows the stiffening.
+/// A block of the `chain-affine` law, which stiffens without bound, crushed between its ends: at a fixed step
+/// just below what is critical at rest the growth is named before anything is infinite; the automatic step
+/// follows the stiffening.
 #[test]
 fn stiffening_beyond_the_step_is_named() {
     let law = Law::ChainAffine.build(100.0, 1200.0, true).unwrap();

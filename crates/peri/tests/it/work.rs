@@ -49,7 +49,8 @@ fn bonds_of_a_box() {
     check([1, 5, 3], 4.015);
 }
 
-/// A bar takes as much room and as many vectors of particles along any axis: its own axis is that along which it is stored.
+/// A bar takes as much room and as many vectors of particles along any axis: its own axis is that along which
+/// it is stored.
 #[test]
 fn bars_are_stored_along_their_axis() {
     fn check<const D: usize>(bars: [[usize; D]; D]) {
@@ -91,14 +92,15 @@ fn bytes_per_particle() {
         eprintln!("{D}D {cells:?}: {each:.1} bytes per particle");
         assert!(each <= most, "{D}D: {each}");
     }
-    // without padding: 8 bytes of bond bits per 64 bonds, 4 of the particle list, 8(3D + 1) of fields: 68 and 100; with
-    // the rows' padding (6 of 300, (6 of 46)²) and the guards 1.02·68 and 1.5·100
+    // without padding: 8 bytes of bond bits per 64 bonds, 4 of the particle list, 8(3D + 1) of fields: 68 and
+    // 100; with the rows' padding (6 of 300, (6 of 46)²) and the guards 1.02·68 and 1.5·100
     check([300, 300], 72.0);
     check([46, 46, 46], 150.0);
     check([100, 100, 100], 130.0);
 }
 
-/// One force evaluation an iteration and one a step, where balance is found; the stretches of its start and its end take no forces.
+/// One force evaluation an iteration and one a step, where balance is found; the stretches of its start and
+/// its end take no forces.
 #[test]
 fn force_evaluations() {
     let mut built = Body::<2>::damaged([24, 20], 0.1, 3.015).build();

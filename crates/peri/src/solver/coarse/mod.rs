@@ -1,5 +1,5 @@
-//! The coarse level of a two-level preconditioner: P A_c⁻¹ Pᵀ with P the hat functions of [`space`], A_c their stiffness
-//! of [`stiffness`], factored by [`factor`].
+//! Coarse level of a two-level preconditioner: P A_c⁻¹ Pᵀ with P the hat functions of [`space`], A_c their
+//! stiffness of [`stiffness`], factored by [`factor`].
 
 mod factor;
 mod space;
@@ -21,27 +21,27 @@ use space::{CORNERS, NONE, Space};
 use stiffness::{Assembly, ElementMatrix};
 use transfer::{Prolong, Restrict};
 
-/// Stiffness against rigid motion over that against the longest wave of the body: pieces that float free, and those that
-/// turn about one bond, have none of their own.
+/// Stiffness against rigid motion over that against the longest wave of the body: floating pieces, and pieces
+/// that rotate about one bond, have none of their own.
 const SHIFT: f64 = 0.01;
 /// Least diagonal entry over the mean one.
 const LEAST_DIAGONAL: f64 = 1e-9;
-/// Elements that are summed by one work item.
+/// Elements summed by one work item.
 const BATCH: usize = 64;
 
-/// What a coarse level is built for.
+/// Body and law of a coarse level.
 pub struct Body<'a, const D: usize> {
     /// The bonds.
     pub bonds: &'a dyn BodyGeometry<D>,
-    /// The loads, for what they hold.
+    /// Loads, for the constrained components.
     pub loads: &'a Loads<D>,
-    /// Where the body is.
+    /// Present displacement.
     pub displacement: &'a Field<D>,
-    /// The law; kθ, N/m⁶, and λ of the volume in addition to that of bonds, Pa; the stretches that the law is fitted for.
+    /// Law; kθ, N/m⁶, and λ of the volume in excess of that of bonds, Pa; fitted stretches.
     pub law: (&'a dyn BondPotential, [f64; 2], [f64; 2]),
-    /// Stiffness density of each site, N/m⁵, which holds what is constrained.
+    /// Stiffness density of each site, N/m⁵, that holds constrained components.
     pub springs: &'a [f64],
-    /// The bonds' survey.
+    /// Counts of the bonds.
     pub survey: &'a Survey,
     /// Faces held by rigid planes.
     pub anchors: &'a [Anchor<D>],
@@ -49,9 +49,9 @@ pub struct Body<'a, const D: usize> {
 
 /// A face held by a rigid plane.
 pub struct Anchor<const D: usize> {
-    /// The particle at the face: functions hardly change over what is below it.
+    /// Particle at the face: functions hardly change over the particles below it.
     pub site: u32,
-    /// Direction in which it is held; `None`: all.
+    /// Direction in which it is held; `None`: all directions.
     pub normal: Option<[f64; D]>,
     /// Stiffness, N/m.
     pub stiffness: f64,
@@ -61,19 +61,19 @@ pub struct Anchor<const D: usize> {
 pub struct Coarse<const D: usize> {
     space: Space<D>,
     factor: Factor,
-    /// Place of each particle among the elements' members; [`NONE`] for those without bonds.
+    /// Index of each particle among the elements' members; [`NONE`] for particles without bonds.
     places: Vec<u32>,
     /// P c of the members, in their order.
     moved: Field<D>,
-    /// Of each element: Pᵀg at its corners, component by component.
+    /// Pᵀg of each element at its corners, component by component.
     parts: Vec<f64>,
     /// Coefficients of the functions, D each.
     coefficients: Vec<f64>,
 }
 
 impl<const D: usize> Coarse<D> {
-    /// Functions with cells of about `edge` (m), `most` degrees of freedom; keeps the analysis of `old` where it can.
-    /// `None` where the body is too small or too broken for a coarse level.
+    /// Builds functions with cells of about `edge` (m), at most `most` degrees of freedom; reuses the
+    /// analysis of `old` if possible. `None` if the body is too small or too broken for a coarse level.
     pub fn new(body: &Body<D>, edge: f64, most: usize, old: Option<Self>) -> Option<Self> {
         // a lattice's particle with every bond has neighbours on all sides; a cloud's may still be at a gap
         let whole = if body.bonds.whole_family().is_some() { body.survey.most } else { u32::MAX };
@@ -198,7 +198,7 @@ fn extent<const D: usize>(bonds: &dyn BodyGeometry<D>) -> f64 {
     (0..D).map(|d| (high[d] - low[d] + bonds.spacing()).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Functions that share an element with each function, up to itself.
+/// Functions that share an element with each function, up to and including itself.
 struct Blocks {
     starts: Vec<usize>,
     others: Vec<u32>,
@@ -236,7 +236,7 @@ fn pattern<const D: usize>(space: &Space<D>) -> (Pattern, Blocks) {
     (pattern, blocks)
 }
 
-/// The sum of the element matrices, and of the shift.
+/// Sums the element matrices and the shift.
 fn assemble<const D: usize>(
     space: &Space<D>,
     pattern: &Pattern,
@@ -256,7 +256,7 @@ fn assemble<const D: usize>(
                 let place = others.partition_point(|&other| other < row);
                 for i in 0..D {
                     for j in 0..D {
-                        // the upper triangle alone is kept
+                        // only the upper triangle is kept
                         if row as usize == column && i > j {
                             continue;
                         }
@@ -271,7 +271,7 @@ fn assemble<const D: usize>(
             }
         }
     }
-    // a function that its particles hardly see
+    // a function that its particles hardly reach
     let mean =
         (0..pattern.size()).map(|k| entries[pattern.starts[k + 1] - 1]).sum::<f64>() / pattern.size() as f64;
     for k in 0..pattern.size() {

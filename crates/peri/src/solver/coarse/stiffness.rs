@@ -1,6 +1,6 @@
-//! Stiffness of the body as the coarse functions see it: its particles as quadrature points of
-//! Σ_I V_I ∇φ_a : C_I : ∇φ_b, C_I = Σ_J kθ w V_J/|ξ| T ⊗ ξ ⊗ ξ, with T = t′ m⊗m + (t/λ)(1 − m⊗m) the tangent of a bond
-//! of direction m; the Hessian of the bonds' energy where the functions are linear within a horizon.
+//! Stiffness of the body in the space of the coarse functions, with its particles as quadrature points of Σ_I
+//! V_I ∇φ_a : C_I : ∇φ_b, C_I = Σ_J kθ w V_J/|ξ| T ⊗ ξ ⊗ ξ, with T = t′ m⊗m + (t/λ)(1 − m⊗m) the tangent of a
+//! bond of direction m: the Hessian of the bonds' energy for functions linear within a horizon.
 
 use super::space::{CORNERS, Element, Space};
 use crate::bonds::{BodyGeometry, Bonds};
@@ -16,12 +16,13 @@ const PAIRS: usize = CORNERS * (CORNERS + 1) / 2;
 const NODES: usize = 1024;
 /// Least tangent of a bond, over that at rest: a matrix of soft bonds must stay positive definite.
 const LEAST: f64 = 0.05;
-/// Part of the stiffness of its particles that the empty part of a cell has (the finite cell method of Parvizian, Düster &
-/// Rank 2007, doi:10.1007/s00466-007-0173-y): a few particles in a cell do not hold all its functions.
+/// Stiffness of the empty part of a cell over that of its particles (the finite cell method of Parvizian,
+/// Düster & Rank 2007, doi:10.1007/s00466-007-0173-y): a few particles in a cell do not hold all its
+/// functions.
 const FICTITIOUS: f64 = 0.1;
-/// Particles of an element whose C is computed for all that have every bond.
+/// Particles of an element from which the C of all complete families is computed.
 const SAMPLES: usize = 4;
-/// Bonds that turn and stretch by less are taken as at rest.
+/// Relative rotation and stretch below which bonds count as undeformed.
 const SMALL: f64 = 0.1;
 
 /// C_I/kθ: pairs of components (i, j) by pairs of derivatives (k, l), off-diagonal pairs once.
@@ -33,18 +34,18 @@ type Products = [[f64; SYMMETRIC]; PAIRS];
 /// Element stiffness: for each pair of corners a ≤ b, the matrix of components (i of a, j of b) at iD + j.
 pub type ElementMatrix = [[f64; 9]; PAIRS];
 
-/// What is known of all bonds before anything is built.
+/// Counts of all bonds before anything is built.
 pub struct Survey {
     /// Number of bonds of each site.
     pub bonded: Vec<u32>,
     /// The most bonds of any particle.
     pub most: u32,
-    /// Largest |η|/|ξ| of a lattice's bonds of one spacing: how much bonds have turned or stretched.
+    /// Largest |η|/|ξ| of a lattice's bonds of one spacing: the rotation or stretch of bonds.
     pub moved: f64,
 }
 
 impl Survey {
-    /// Counts the bonds of every particle, and looks at those of a lattice to the nearest particles.
+    /// Counts the bonds of every particle, and measures those of a lattice to the nearest particles.
     pub fn new<const D: usize>(bonds: &dyn Bonds<D>, displacement: &Field<D>) -> Self {
         let lattice = bonds.as_lattice();
         let is_unit = |offset: &[i32; D]| offset.iter().map(|o| o.abs()).sum::<i32>() == 1;
@@ -98,7 +99,7 @@ impl Tangents {
     }
 }
 
-/// What element matrices are made of.
+/// Data of the element matrices.
 pub struct Assembly<'a, const D: usize> {
     bonds: &'a dyn BodyGeometry<D>,
     loads: &'a Loads<D>,
@@ -108,19 +109,19 @@ pub struct Assembly<'a, const D: usize> {
     modulus: f64,
     /// Stiffness density M_I at constrained components, N/m⁵.
     springs: &'a [f64],
-    /// Whether the body is a lattice.
+    /// True if the body is a lattice.
     lattice: bool,
-    /// C of particles without a bond missing, where bonds are as at rest.
+    /// C of particles with complete families, if bonds are undeformed.
     interior: Option<Tangent>,
     /// Volume of a cell (2D: times the thickness), m³, and Σ V ∂φ_a ∂φ_b over all of it.
     cell: f64,
     full: Products,
-    /// λ of the volume in addition to that of bonds, Pa.
+    /// λ of the volume in excess of that of bonds, Pa.
     volumetric: f64,
 }
 
 impl<'a, const D: usize> Assembly<'a, D> {
-    /// `law` comes with kθ and the λ of the volume beside it, and the stretches that it is fitted over.
+    /// Prepares the assembly; `law` comes with kθ and the excess λ of the volume, and the fitted stretches.
     pub fn new(
         bonds: &'a dyn BodyGeometry<D>,
         loads: &'a Loads<D>,
@@ -165,7 +166,7 @@ impl<'a, const D: usize> Assembly<'a, D> {
         assembly
     }
 
-    /// C_I.
+    /// Computes C_I.
     fn tangent(&self, site: usize) -> Tangent {
         let own = self.displacement.get(site);
         let mut result = [[0.0; SYMMETRIC]; SYMMETRIC];
@@ -201,12 +202,13 @@ impl<'a, const D: usize> Assembly<'a, D> {
         result
     }
 
-    /// Whether the particle in a site has every bond of its lattice: its C is that of others beside it.
+    /// Returns true if the particle in a site has every bond of its lattice: its C equals that of others
+    /// beside it.
     fn is_full(&self, site: usize) -> bool {
         self.lattice && self.survey.bonded[site] == self.survey.most
     }
 
-    /// C that stands for the particles of an element that have every bond: that at rest, or the mean of a few.
+    /// C for the particles of an element with complete families: that at rest, or the mean of a few.
     fn shared(&self, members: &[u32]) -> Option<Tangent> {
         if self.interior.is_some() {
             return self.interior;
@@ -215,14 +217,14 @@ impl<'a, const D: usize> Assembly<'a, D> {
         let samples = full.len().min(SAMPLES);
         let mut mean = [[0.0; SYMMETRIC]; SYMMETRIC];
         for k in 0..samples {
-            // in the middle of each of the parts
+            // in the middle of each part
             let site = full[(2 * k + 1) * full.len() / (2 * samples)];
             add_tangent(&mut mean, &self.tangent(site), 1.0 / samples as f64);
         }
         (samples > 0).then_some(mean)
     }
 
-    /// Stiffness of an element, and for each corner Σ V φ over its particles.
+    /// Computes the stiffness of an element, and for each corner Σ V φ over its particles.
     pub fn element(&self, space: &Space<D>, element: &Element) -> (ElementMatrix, [f64; CORNERS]) {
         let corners = 1 << D;
         let mut matrix = [[0.0; 9]; PAIRS];
@@ -268,7 +270,7 @@ impl<'a, const D: usize> Assembly<'a, D> {
         (matrix, measure)
     }
 
-    /// Adds the springs that hold what is constrained.
+    /// Adds the springs that hold constrained components.
     fn hold(&self, matrix: &mut ElementMatrix, site: usize, volume: f64, values: &[f64; CORNERS]) {
         let constrained = self.loads.constrained(site);
         if constrained == 0 {
@@ -286,7 +288,7 @@ impl<'a, const D: usize> Assembly<'a, D> {
         }
     }
 
-    /// Σ_I V_I C_1111 / Σ_I V_I, or so: how stiff the body is.
+    /// Mean stiffness of the body, about Σ_I V_I C_1111 / Σ_I V_I.
     pub fn stiffness(&self) -> f64 {
         let particles = self.bonds.particles();
         let site = particles.iter().max_by_key(|&&s| (self.survey.bonded[s as usize], u32::MAX - s));
@@ -319,8 +321,8 @@ fn contract<const D: usize>(matrix: &mut ElementMatrix, tangent: &Tangent, produ
     }
 }
 
-/// matrix += λV ∂_iφ_a ∂_jφ_b, in full: a coarse level that takes less than the body's own stiffness, as by one point a cell, makes
-/// solutions slower than none (K/μ = 1000: 809 iterations for 263; in full 189).
+/// matrix += λV ∂_iφ_a ∂_jφ_b, fully integrated: a coarse level softer than the body, as with one point a
+/// cell, makes solutions slower than none (K/μ = 1000: 809 iterations instead of 263; fully integrated 189).
 fn add_volumetric<const D: usize>(matrix: &mut ElementMatrix, stiffness: f64, slopes: &[[f64; D]; CORNERS]) {
     let mut at = 0;
     for a in 0..1 << D {
