@@ -1,10 +1,10 @@
 //! Births: elements that appear with a temperature, and conserve energy.
 //!
-//! A node of new elements only takes their temperature. A node that old and new elements share takes the temperature
-//! T* at which the energy counted at it is the sum of what both had:
-//! Σ_old m [U(T*) − U(T_old)] + Σ_new m [U(T*) − U(T_birth)] = 0, with the material's own energy and what its state does
-//! in a jump of no duration (Δt = 0). Nothing is lost, however thin the layer; with linear materials it is the mixture
-//! by heat capacity. A prescribed temperature stays, and its support takes the difference.
+//! A node of new elements only takes their temperature. A node that old and new elements share takes the
+//! temperature T* at which the energy counted at it is the sum of what both had: Σ_old m [U(T*) − U(T_old)] +
+//! Σ_new m [U(T*) − U(T_birth)] = 0, with the material's own energy and what its state does in a jump of no
+//! duration (Δt = 0). Nothing is lost, however thin the layer; with linear materials it is the mixture by
+//! heat capacity. A prescribed temperature stays, and its support takes the difference.
 
 use crate::element::{self, Geometry, MOST, WIDE, WIDE_POINTS};
 use crate::error::Error;

@@ -26,8 +26,8 @@ impl Schedule {
     /// A sine between two values that passes their middle upwards at t = 0.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for values that are not finite, a high one below the low one, and a period that is not above
-    /// 0 and finite.
+    /// [`Error::Parameter`] for values that are not finite, a high one below the low one, and a period that
+    /// is not above 0 and finite.
     pub fn swing(low: f64, high: f64, period: f64) -> Result<Self, Error> {
         let wrong = |name, found, allowed: String| Err(Error::Parameter { name, found, allowed });
         if !low.is_finite() {
@@ -50,7 +50,8 @@ impl Schedule {
     /// Through (time, value) pairs. Steps land on their times.
     ///
     /// # Errors
-    /// [`Error::Parameter`] where there is none, where times do not ascend, and for values that are not finite.
+    /// [`Error::Parameter`] where there is none, where times do not ascend, and for values that are not
+    /// finite.
     pub fn linear(pairs: &[(f64, f64)]) -> Result<Self, Error> {
         let wrong = |name, found, allowed: &str| Error::Parameter { name, found, allowed: allowed.into() };
         if pairs.is_empty() {

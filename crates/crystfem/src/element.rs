@@ -1,8 +1,9 @@
-//! Hexahedra (2 × 2 × 2 Gauss points), tetrahedra (4 points) and wedges (6 points) of first order, and those of second
-//! order ([`natural`]): shapes, gradients, volumes, faces.
+//! Hexahedra (2 × 2 × 2 Gauss points), tetrahedra (4 points) and wedges (6 points) of first order, and those
+//! of second order ([`natural`]): shapes, gradients, volumes, faces.
 //!
-//! In first-order elements integration point g lies nearest to corner g. With lumped capacity, energy is counted at the
-//! corner and conduction at the Gauss point beside it, so each pair is one material point with one state.
+//! In first-order elements integration point g lies nearest to corner g. With lumped capacity, energy is
+//! counted at the corner and conduction at the Gauss point beside it, so each pair is one material point with
+//! one state.
 
 mod face;
 pub mod natural;
@@ -23,7 +24,8 @@ pub const WIDE_POINTS: usize = 27;
 
 /// 1/√3: the abscissa of the two-point Gauss rule.
 const GAUSS: f64 = 0.577_350_269_189_625_8;
-/// The four-point rule of a tetrahedron, exact to degree 2: one barycentric coordinate is NEAR, three are FAR.
+/// The four-point rule of a tetrahedron, exact to degree 2: one barycentric coordinate is NEAR, three are
+/// FAR.
 const NEAR: f64 = 0.585_410_196_624_968_5;
 const FAR: f64 = 0.138_196_601_125_010_5;
 
@@ -76,7 +78,8 @@ pub fn shapes<const N: usize, const P: usize>(nodes: usize) -> [[f64; N]; P] {
 }
 
 impl<const N: usize, const P: usize> Geometry<N, P> {
-    /// Of the element with these nodes, at most `N`; `None` where a Jacobian is not positive (inverted, flat, folded).
+    /// Of the element with these nodes, at most `N`; `None` where a Jacobian is not positive (inverted, flat,
+    /// folded).
     pub fn new(corners: &[[f64; 3]]) -> Option<Self> {
         let nodes = corners.len();
         let mut geometry = Self {
@@ -297,7 +300,8 @@ mod tests {
         assert!(<Geometry>::new(&[[f64::NAN; 3]; 4]).is_none());
     }
 
-    /// The sides of a second-order element close it, and a curved one has the volume that the divergence theorem gives.
+    /// The sides of a second-order element close it, and a curved one has the volume that the divergence
+    /// theorem gives.
     #[test]
     fn second_order_sides_close_the_element() {
         for shape in Shape::ALL {

@@ -89,8 +89,8 @@ impl Simulation {
         nodes.iter().map(|&node| self.mean_at(name, node)).collect()
     }
 
-    /// A quantity of the materials at all nodes of the mesh: the mean of the points there, weighted by mass; `None` where no
-    /// material has it or nothing exists.
+    /// A quantity of the materials at all nodes of the mesh: the mean of the points there, weighted by mass;
+    /// `None` where no material has it or nothing exists.
     pub fn field(&self, name: &str) -> Vec<Option<f64>> {
         let (problem, system) = (&self.problem, &self.system);
         let nodes = problem.mesh.points.len();
@@ -138,8 +138,8 @@ impl Simulation {
         sum.iter().zip(&mass).map(|(sum, mass)| (*mass > 0.0).then(|| sum / mass)).collect()
     }
 
-    /// A quantity of the materials in each element: the mean of its own points, those of its material and birth; `None` where its material does not
-    /// have it or it does not exist.
+    /// A quantity of the materials in each element: the mean of its own points, those of its material and
+    /// birth; `None` where its material does not have it or it does not exist.
     pub fn element_means(&self, name: &str) -> Vec<Option<f64>> {
         let (problem, system) = (&self.problem, &self.system);
         let mean = |sum: f64, count: usize| (count > 0).then(|| sum / count as f64);
@@ -175,7 +175,8 @@ impl Simulation {
         means
     }
 
-    /// A quantity of the materials at a place, as [`Self::field`] at its nodes; `None` where no material there has it.
+    /// A quantity of the materials at a place, as [`Self::field`] at its nodes; `None` where no material
+    /// there has it.
     pub fn field_at(&self, name: &str, place: [f64; 3]) -> Option<f64> {
         let field = self.field(name);
         self.problem.mesh.locate(place)?.value(|node| field[node as usize])

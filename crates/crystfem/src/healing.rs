@@ -3,12 +3,13 @@
 use crate::error::Error;
 use crate::kinetics::GAS_CONSTANT;
 
-/// Degree of healing D_h = min(1, ∫ w dt/τ_r(T))^¼ of chains that cross an interface from contact on (Yang and Pitchumani 2002), with the melt's
-/// share w = 1 − α of the colder side: crystals stop it, remelting lets it go on. Strength is D_h times, fracture energy D_h² times that of
-/// the material (de Gennes, Wool).
+/// Degree of healing D_h = min(1, ∫ w dt/τ_r(T))^¼ of chains that cross an interface from contact on (Yang
+/// and Pitchumani 2002), with the melt's share w = 1 − α of the colder side: crystals stop it, remelting lets
+/// it go on. Strength is D_h times, fracture energy D_h² times that of the material (de Gennes, Wool).
 ///
-/// The relaxation time is τ₀ at T₀. It follows Arrhenius in the melt, τ_r ∝ exp(H/(RT)), and, with a [`Glass`], the equation of Williams, Landel
-/// and Ferry from there down to the glass transition, at and below which nothing heals.
+/// The relaxation time is τ₀ at T₀. It follows Arrhenius in the melt, τ_r ∝ exp(H/(RT)), and, with a
+/// [`Glass`], the equation of Williams, Landel and Ferry from there down to the glass transition, at and
+/// below which nothing heals.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Healing {
     time: f64,
@@ -43,7 +44,8 @@ impl Glass {
         -std::f64::consts::LN_10 * self.steepness * above / (self.width + above)
     }
 
-    /// Temperature at which the apparent activation energy R T² ln 10 C₁C₂/(C₂ + T − T_g)² falls to `energy`, J/mol, but T_g + 100 K at most.
+    /// Temperature at which the apparent activation energy R T² ln 10 C₁C₂/(C₂ + T − T_g)² falls to `energy`,
+    /// J/mol, but T_g + 100 K at most.
     fn border(&self, energy: f64) -> f64 {
         let Self { transition, steepness, width } = *self;
         // √H (C₂ + T − T_g) = √(R ln 10 C₁C₂) T
@@ -62,7 +64,8 @@ impl Healing {
     /// τ₀, s, at T₀, K, and H, J/mol: Arrhenius at any temperature.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a time or a temperature that is not above 0, an energy below 0, and what is not finite.
+    /// [`Error::Parameter`] for a time or a temperature that is not above 0, an energy below 0, and what is
+    /// not finite.
     pub fn new(time: f64, temperature: f64, energy: f64) -> Result<Self, Error> {
         positive(&[("relaxation time of healing, s", time), ("temperature of healing, K", temperature)])?;
         if !(energy >= 0.0 && energy.is_finite()) {
@@ -120,7 +123,8 @@ impl Healing {
         }
     }
 
-    /// ∫ w dt/τ_r over a step of temperatures, K, and melt's shares that are linear in time, by two points of Gauss: fourth order in the step.
+    /// ∫ w dt/τ_r over a step of temperatures, K, and melt's shares that are linear in time, by two points of
+    /// Gauss: fourth order in the step.
     pub fn progress(&self, temperatures: [f64; 2], melt: [f64; 2], duration: f64) -> f64 {
         let reach = 0.5 / 3.0_f64.sqrt();
         let at = |[from, to]: [f64; 2], share: f64| from + share * (to - from);
@@ -179,7 +183,8 @@ mod tests {
         near("healing: its degree, ended by crystals", Healing::degree(sum), 0.816185, 1e-6);
     }
 
-    /// From T_g + 100 K down to T_g + 20 K the WLF equation slows healing by 10^6.63, Arrhenius at 60 kJ/mol by 10^1.8.
+    /// From T_g + 100 K down to T_g + 20 K the WLF equation slows healing by 10^6.63, Arrhenius at 60 kJ/mol
+    /// by 10^1.8.
     #[test]
     fn the_glass_stops_it() {
         let arrhenius = Healing::new(2.0, 453.15, 60e3).unwrap();

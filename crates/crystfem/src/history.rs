@@ -60,8 +60,8 @@ impl History {
     /// From points.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for no points, unequal columns, times that decrease, temperatures below 0 K, and what is not
-    /// finite.
+    /// [`Error::Parameter`] for no points, unequal columns, times that decrease, temperatures below 0 K, and
+    /// what is not finite.
     pub fn new(times: Vec<f64>, temperatures: Vec<f64>) -> Result<Self, Error> {
         let refuse = |name, found, allowed: String| Err(Error::Parameter { name, found, allowed });
         if times.is_empty() || times.len() != temperatures.len() {

@@ -2,8 +2,9 @@
 
 pub use crate::system::Exchange;
 
-/// Shift of temperature, K. A step that moves less heat than by which its balance would change if all temperatures
-/// shifted by this has its balance measured against that: temperatures of 500 K are known to 6e-14 K only.
+/// Shift of temperature, K. A step that moves less heat than by which its balance would change if all
+/// temperatures shifted by this has its balance measured against that: temperatures of 500 K are known to
+/// 6e-14 K only.
 pub const NOTHING: f64 = 1e-2;
 
 /// Energy since the start, J. Heat into the body counts positive.
@@ -34,8 +35,8 @@ pub struct Record {
     pub stored: f64,
     /// Σ|ΔE_i| over the nodes: heat moved within the body counts, too.
     pub moved: f64,
-    /// Change of the balance with a uniform shift of the free temperatures, J/K: capacity, and over the step what
-    /// goes through surfaces and to prescribed nodes.
+    /// Change of the balance with a uniform shift of the free temperatures, J/K: capacity, and over the step
+    /// what goes through surfaces and to prescribed nodes.
     pub sensitivity: f64,
     /// Heat through surfaces and from sources.
     pub exchange: Exchange,

@@ -22,8 +22,8 @@ impl Melting {
     /// From sharpness k_m, 1/K, shape d and peak T_p, K.
     ///
     /// # Errors
-    /// [`Error::Parameter`] unless k_m > 0, d ≥ 1.001 (Richards' curve has its limit, Gompertz', at 1) and T_p > 0 are
-    /// finite.
+    /// [`Error::Parameter`] unless k_m > 0, d ≥ 1.001 (Richards' curve has its limit, Gompertz', at 1) and
+    /// T_p > 0 are finite.
     pub fn new(sharpness: f64, shape: f64, peak: f64) -> Result<Self, Error> {
         let check = |name, found: f64, good: bool, allowed: &str| {
             if good && found.is_finite() {

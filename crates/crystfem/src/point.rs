@@ -1,5 +1,5 @@
-//! The material alone, at one point: under a given temperature history, or as a lumped body that exchanges heat with its
-//! surroundings or none.
+//! The material alone, at one point: under a given temperature history, or as a lumped body that exchanges
+//! heat with its surroundings or none.
 
 use crate::error::Error;
 use crate::history::{History, Segment};
@@ -17,7 +17,8 @@ pub use material_point::MaterialPoint;
 pub enum Drive {
     /// It is given.
     Prescribed(History),
-    /// Newton's cooling: dU/dt = −c (T − T_a)/τ, c the heat capacity at the start; adiabatic without exchange.
+    /// Newton's cooling: dU/dt = −c (T − T_a)/τ, c the heat capacity at the start; adiabatic without
+    /// exchange.
     Lumped {
         /// Temperature at the start, K.
         start: f64,
@@ -107,7 +108,8 @@ impl Course<'_> {
     /// The curves.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for steps that are not above 0 or more than [`MOST_STEPS`]; what the material refuses.
+    /// [`Error::Parameter`] for steps that are not above 0 or more than [`MOST_STEPS`]; what the material
+    /// refuses.
     pub fn run(&self) -> Result<Curves, Error> {
         self.check()?;
         let mut state = vec![0.0; self.material.state_names().len()];

@@ -40,8 +40,9 @@ impl PrintPlan {
         Self { births, absent: Vec::new(), layers, end }
     }
 
-    /// Each element appears at its time along a path, s after `start`, those of one `window` together (default: a hundredth of
-    /// the path's duration), at a given temperature or that of the nozzle when the element is laid down.
+    /// Each element appears at its time along a path, s after `start`, those of one `window` together
+    /// (default: a hundredth of the path's duration), at a given temperature or that of the nozzle when the
+    /// element is laid down.
     ///
     /// # Errors
     /// Those of [`groups`]; [`Error::Parameter`] named [`NOZZLE`].

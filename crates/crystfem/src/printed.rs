@@ -20,7 +20,8 @@ enum Order {
 
 /// A part that is printed layer by layer or along a tool path.
 ///
-/// By default layers come every 20 s at 220 °C, a path has the temperatures of its nozzle, and no heat crosses the surface.
+/// By default layers come every 20 s at 220 °C, a path has the temperatures of its nozzle, and no heat
+/// crosses the surface.
 pub struct PrintedPart {
     mesh: Mesh,
     order: Order,
@@ -123,8 +124,9 @@ impl PrintedPart {
     /// The problem, to which conditions and sources may be added.
     ///
     /// # Errors
-    /// [`Error::Mesh`] for a surface that the mesh lacks, and for elements in no layer where there is no substrate;
-    /// [`Error::Parameter`] for a time between layers that is not positive. [`Simulation::new`] checks the rest.
+    /// [`Error::Mesh`] for a surface that the mesh lacks, and for elements in no layer where there is no
+    /// substrate; [`Error::Parameter`] for a time between layers that is not positive. [`Simulation::new`]
+    /// checks the rest.
     pub fn problem(self) -> Result<Problem, Error> {
         let Self { mesh, order, material, substrate, interval, temperature, held, outer } = self;
         if !(interval > 0.0 && interval.is_finite()) {

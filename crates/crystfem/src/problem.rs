@@ -12,8 +12,8 @@ use std::sync::Arc;
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Capacity {
-    /// At the nodes; so are film, radiation and the state of materials with constant conductivity. Temperatures do
-    /// not overshoot where a layer is born.
+    /// At the nodes; so are film, radiation and the state of materials with constant conductivity.
+    /// Temperatures do not overshoot where a layer is born.
     #[default]
     Lumped,
     /// By the shape functions, everything at Gauss points.
@@ -253,8 +253,8 @@ impl Problem {
     }
 }
 
-/// Temperature at the nodes, K, from that of each element: of the last element at a node that is not among those `later`
-/// printed.
+/// Temperature at the nodes, K, from that of each element: of the last element at a node that is not among
+/// those `later` printed.
 pub fn initial_temperatures(mesh: &Mesh, temperature_of: &[f64], later: &HashSet<u32>) -> Field {
     let first = temperature_of.first().copied().unwrap_or(0.0);
     if temperature_of.iter().all(|&temperature| temperature == first) {

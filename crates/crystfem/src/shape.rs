@@ -1,6 +1,7 @@
 //! Element types: their corners, edges and sides, and the order of their nodes here and in other programs.
 
-/// Sides of a wedge: triangles 0 and 1, quadrilaterals 2 to 4, numbered as in Abaqus, anticlockwise seen from outside.
+/// Sides of a wedge: triangles 0 and 1, quadrilaterals 2 to 4, numbered as in Abaqus, anticlockwise seen from
+/// outside.
 const WEDGE_SIDES: [&[usize]; 5] = [&[0, 2, 1], &[3, 4, 5], &[0, 1, 4, 3], &[1, 2, 5, 4], &[2, 0, 3, 5]];
 /// Local nodes of the sides S1 … S6 of a hexahedron, anticlockwise seen from outside.
 pub const HEXAHEDRON_SIDES: [[usize; 4]; 6] =
@@ -12,8 +13,8 @@ const HEXAHEDRON_EDGES: [[usize; 2]; 12] =
 const TETRAHEDRON_EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]];
 const WEDGE_EDGES: [[usize; 2]; 9] = [[0, 1], [1, 2], [2, 0], [3, 4], [4, 5], [5, 3], [0, 3], [1, 4], [2, 5]];
 
-/// An element type. Nodes are in the order of Abaqus (C3D8, C3D4, C3D6, C3D20, C3D10, C3D15): corners, then the node on the
-/// middle of each edge in the order of [`Shape::edges`].
+/// An element type. Nodes are in the order of Abaqus (C3D8, C3D4, C3D6, C3D20, C3D10, C3D15): corners, then
+/// the node on the middle of each edge in the order of [`Shape::edges`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Shape {
     /// 8 nodes.
@@ -139,8 +140,9 @@ impl Shape {
         }
     }
 
-    /// Number in VTK, and the position here of each node in VTK's order: VTK counts the first triangle of a 6-node wedge
-    /// the other way round (vtkWedge: its normal points away from the second), and all others as Abaqus.
+    /// Number in VTK, and the position here of each node in VTK's order: VTK counts the first triangle of a
+    /// 6-node wedge the other way round (vtkWedge: its normal points away from the second), and all others as
+    /// Abaqus.
     pub const fn vtk(self) -> (u8, Option<[usize; 6]>) {
         match self {
             Self::Hexahedron => (12, None),
@@ -152,8 +154,8 @@ impl Shape {
         }
     }
 
-    /// Position in Gmsh's order of each node here: Gmsh counts the edges of second-order elements in its own order
-    /// (<https://gmsh.info/doc/texinfo/gmsh.html#Node-ordering>).
+    /// Position in Gmsh's order of each node here: Gmsh counts the edges of second-order elements in its own
+    /// order (<https://gmsh.info/doc/texinfo/gmsh.html#Node-ordering>).
     pub const fn gmsh(self) -> &'static [usize] {
         const FIRST: [usize; 8] = [0, 1, 2, 3, 4, 5, 6, 7];
         match self {

@@ -1,5 +1,5 @@
-//! exp and ln without branches or tables, so that loops over them become vectors of the processor. Inline them into functions that
-//! `pulp` dispatches. Errors are a few 2⁻⁵³ of the result.
+//! exp and ln without branches or tables, so that loops over them become vectors of the processor. Inline
+//! them into functions that `pulp` dispatches. Errors are a few 2⁻⁵³ of the result.
 
 /// 1.5·2⁵²: what is added to it is rounded to a whole number.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;

@@ -1,5 +1,5 @@
-//! A problem in time: [`Simulation::advance`] goes from one time to the next, through births, in steps that land on
-//! every given time.
+//! A problem in time: [`Simulation::advance`] goes from one time to the next, through births, in steps that
+//! land on every given time.
 
 mod step;
 
@@ -256,12 +256,12 @@ impl Simulation {
         self.problem.mesh.locate(place)?.value(|node| self.temperature(node))
     }
 
-    /// Goes to a time. `observe` sees every accepted step, and may stop there. Births at `until` itself are left to
-    /// the next call, so that outputs at that time show what was before them.
+    /// Goes to a time. `observe` sees every accepted step, and may stop there. Births at `until` itself are
+    /// left to the next call, so that outputs at that time show what was before them.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a time that has passed; those of the materials; [`Error::NotConverged`] where a
-    /// step as short as allowed has no solution.
+    /// [`Error::Parameter`] for a time that has passed; those of the materials; [`Error::NotConverged`] where
+    /// a step as short as allowed has no solution.
     pub fn advance(
         &mut self,
         until: f64,
@@ -270,7 +270,8 @@ impl Simulation {
         self.advance_unless(&|| false, until, observe)
     }
 
-    /// [`Self::advance`], which also stops within a step once `stop` is true, and stays so: as if that step had not begun.
+    /// [`Self::advance`], which also stops within a step once `stop` is true, and stays so: as if that step
+    /// had not begun.
     ///
     /// # Errors
     /// As [`Self::advance`].

@@ -1,4 +1,5 @@
-//! Columns of tables of measured numbers, read by [`polycore::table`], and the names under which calorimeters write them.
+//! Columns of tables of measured numbers, read by [`polycore::table`], and the names under which calorimeters
+//! write them.
 
 use crate::error::Error;
 use polycore::table::{self, Table};
@@ -80,8 +81,9 @@ impl Column {
 /// Reads columns, in SI units, whatever their order and units in the file; others are passed over.
 ///
 /// # Errors
-/// [`Error::File`] with line and column for a file that cannot be read, a missing or repeated column, a row of another
-/// length, what is no finite number or not of the column's dimension, a number out of its range, and no row at all.
+/// [`Error::File`] with line and column for a file that cannot be read, a missing or repeated column, a row
+/// of another length, what is no finite number or not of the column's dimension, a number out of its range,
+/// and no row at all.
 pub fn read<const N: usize>(path: &Path, columns: [Column; N]) -> Result<[Vec<f64>; N], Error> {
     read_with_lines(path, columns).map(|(data, _)| data)
 }
@@ -200,8 +202,8 @@ mod tests {
         );
     }
 
-    /// Exports of calorimeters: the same three rows of Netzsch (Latin-1), TA Instruments (UTF-16), Mettler, PerkinElmer
-    /// and of a spreadsheet.
+    /// Exports of calorimeters: the same three rows of Netzsch (Latin-1), TA Instruments (UTF-16), Mettler,
+    /// PerkinElmer and of a spreadsheet.
     #[test]
     fn exports_of_calorimeters() {
         let netzsch = "#EXO:1\r\n#DECIMAL:COMMA\r\n##Temp./°C;Time/min;DSC/(mW/mg)\r\n200,5;0,0;0,05\r\n\

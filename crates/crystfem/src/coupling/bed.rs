@@ -7,8 +7,8 @@ use crate::mesh::surface::Surface;
 use nalgebra::{Matrix3, Matrix3xX, Vector3};
 use std::collections::{HashMap, HashSet};
 
-/// Nodes of the bearing elements, ascending, that lie on a named surface ([`Surface::region`]), or without a name those
-/// shared with other elements.
+/// Nodes of the bearing elements, ascending, that lie on a named surface ([`Surface::region`]), or without a
+/// name those shared with other elements.
 ///
 /// # Errors
 /// [`Error::Unknown`] for a name that the mesh lacks.
@@ -55,7 +55,8 @@ fn place(mesh: &Mesh, node: u32) -> Vector3<f64> {
     Vector3::from(mesh.points[node as usize])
 }
 
-/// Holds 3, 2 and 1 components of three nodes of the bed, far from each other: no rigid motion is left and no force needed.
+/// Holds 3, 2 and 1 components of three nodes of the bed, far from each other: no rigid motion is left and no
+/// force needed.
 pub(super) fn statically_determinate(mesh: &Mesh, bed: &[u32]) -> Vec<Support> {
     let place = |node: u32| place(mesh, node);
     let farthest = |of: &dyn Fn(u32) -> f64| {

@@ -19,7 +19,8 @@ pub struct Interface {
 }
 
 impl Interface {
-    /// Returns the interfaces between printed elements of different births; `birth_of` gives the number of the birth of each element.
+    /// Returns the interfaces between printed elements of different births; `birth_of` gives the number of
+    /// the birth of each element.
     ///
     /// # Errors
     /// Those of [`Surface::of_all`].
@@ -75,8 +76,8 @@ impl HealingSettings {
     }
 }
 
-/// State of a coupling, for checkpoints: of each interface its integral and, once both sides exist, time, s, temperature, K, and the
-/// melt's share.
+/// State of a coupling, for checkpoints: of each interface its integral and, once both sides exist, time, s,
+/// temperature, K, and the melt's share.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct HealingState(Vec<(f64, Option<[f64; 3]>)>);
 
@@ -132,7 +133,8 @@ impl HealingCoupling {
         self.state.0.iter().map(|(integral, last)| last.map(|_| Healing::degree(*integral)))
     }
 
-    /// Least D_h of the interfaces of each element; 1 inside of a layer, NaN of elements that are not printed or do not exist yet.
+    /// Least D_h of the interfaces of each element; 1 inside of a layer, NaN of elements that are not printed
+    /// or do not exist yet.
     pub fn element_degrees(&self, simulation: &Simulation) -> Vec<f64> {
         let within = |(element, &printed): (u32, &bool)| {
             if printed && simulation.is_born(element) { 1.0 } else { f64::NAN }

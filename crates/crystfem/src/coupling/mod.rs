@@ -1,7 +1,9 @@
-//! Physics that follows the temperatures of a simulation step by step: stress and warpage, healing of interfaces.
+//! Physics that follows the temperatures of a simulation step by step: stress and warpage, healing of
+//! interfaces.
 //!
-//! A coupling sees the start and each accepted step ([`Simulation::observe`](crate::simulation::Simulation::observe)), and saves and
-//! restores its state for checkpoints.
+//! A coupling sees the start and each accepted step
+//! ([`Simulation::observe`](crate::simulation::Simulation::observe)), and saves and restores its state for
+//! checkpoints.
 
 mod bed;
 mod healing;

@@ -24,7 +24,8 @@ pub struct StressSettings {
     pub bears: Vec<bool>,
     /// Nodes on the bed, ascending, which are held during the print.
     pub bed: Vec<u32>,
-    /// Largest change of the linear free strain in any element between two solutions; default [`STRAIN_STEP`].
+    /// Largest change of the linear free strain in any element between two solutions; default
+    /// [`STRAIN_STEP`].
     pub strain_step: f64,
     /// Whether the part is taken off the bed at the end; default true.
     pub release: bool,
@@ -67,8 +68,8 @@ pub struct StressState {
     mises_on_bed: f64,
 }
 
-/// Quasi-static stress of a part whose free strain follows temperature and crystallization ([`SolidifyingMaxwell`]): no
-/// effect back on temperatures.
+/// Quasi-static stress of a part whose free strain follows temperature and crystallization
+/// ([`SolidifyingMaxwell`]): no effect back on temperatures.
 pub struct StressCoupling<'a> {
     settings: StressSettings,
     mesh: &'a Mesh,
@@ -80,7 +81,8 @@ impl<'a> StressCoupling<'a> {
     /// Begins with an empty part on the mesh of a simulation.
     ///
     /// # Errors
-    /// Those of [`Body::new`]; [`Error::Mesh`] for fewer than three nodes on the bed, and elements without a way to it.
+    /// Those of [`Body::new`]; [`Error::Mesh`] for fewer than three nodes on the bed, and elements without a
+    /// way to it.
     pub fn new(mesh: &'a Mesh, settings: StressSettings) -> Result<Self, Error> {
         let mut body = Body::new(mesh, settings.law.poisson)?;
         body.tolerance = TOLERANCE;
@@ -109,8 +111,8 @@ impl<'a> StressCoupling<'a> {
         self.state = state;
     }
 
-    /// Updates after an accepted step, and before the first: activates new elements; solves if the free strain changed by
-    /// more than the strain step, or if elements appear next.
+    /// Updates after an accepted step, and before the first: activates new elements; solves if the free
+    /// strain changed by more than the strain step, or if elements appear next.
     ///
     /// # Errors
     /// Those of [`Body::step`].
@@ -118,8 +120,8 @@ impl<'a> StressCoupling<'a> {
         self.update(simulation, false)
     }
 
-    /// Solves at the end of a simulation, and takes the part off the bed where the settings say so: a step of no duration
-    /// with six supports.
+    /// Solves at the end of a simulation, and takes the part off the bed where the settings say so: a step of
+    /// no duration with six supports.
     ///
     /// # Errors
     /// Those of [`Body::step`].
@@ -156,7 +158,8 @@ impl<'a> StressCoupling<'a> {
             }
             present[element] = now(element);
             if self.state.last[element].is_none() {
-                // its own temperature at birth: what it shares with neighbours at once is a part of its strain
+                // its own temperature at birth: what it shares with neighbours at once is a part of its
+                // strain
                 let birth = (simulation.state().born[element] as usize).checked_sub(1);
                 self.state.last[element] = match birth.and_then(|birth| births.get(birth)) {
                     Some(birth) => Some(Thermal {
@@ -253,8 +256,8 @@ impl<'a> StressCoupling<'a> {
         (0..self.mesh.element_count()).map(largest).collect()
     }
 
-    /// Mean stress of each element, Pa, six each in VTK's order of symmetric tensors, xx, yy, zz, xy, yz, zx; NaN where
-    /// nothing bears stress.
+    /// Mean stress of each element, Pa, six each in VTK's order of symmetric tensors, xx, yy, zz, xy, yz, zx;
+    /// NaN where nothing bears stress.
     pub fn stresses(&self) -> Vec<f64> {
         let mean = |element: usize| match self.is_present(element) {
             true => self.body.mean_stress(element),

@@ -3,7 +3,8 @@
 use super::{GAUSS, natural};
 use crate::shape::Shape;
 
-/// A face at its integration points: 2 × 2 Gauss points, or three on a triangle; 3 × 3 and six of second order.
+/// A face at its integration points: 2 × 2 Gauss points, or three on a triangle; 3 × 3 and six of second
+/// order.
 #[derive(Clone, Debug)]
 pub struct FaceGeometry<const N: usize = 4, const P: usize = 4> {
     /// Number of nodes.
@@ -21,8 +22,8 @@ pub struct FaceGeometry<const N: usize = 4, const P: usize = 4> {
 /// Corners of a quadrilateral in natural coordinates.
 const AROUND: [[f64; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
 
-/// N and ∂N/∂ξ of a second-order triangle (r, s ≥ 0) or quadrilateral (−1 … 1): those of the first side of the solid with
-/// such sides.
+/// N and ∂N/∂ξ of a second-order triangle (r, s ≥ 0) or quadrilateral (−1 … 1): those of the first side of
+/// the solid with such sides.
 fn second_order_face(nodes: usize, [r, s]: [f64; 2]) -> [(f64, [f64; 2]); 8] {
     let (shape, at, order): (_, _, &[usize]) = match nodes {
         8 => (Shape::Hexahedron20, [r, s, -1.0], &[0, 1, 2, 3, 8, 9, 10, 11]),

@@ -1,7 +1,8 @@
-//! Shape functions of wedges and of second-order elements, and their integration rules (Zienkiewicz & Taylor, vol. 1).
+//! Shape functions of wedges and of second-order elements, and their integration rules (Zienkiewicz & Taylor,
+//! vol. 1).
 //!
-//! Natural coordinates: −1 … 1 along each axis of a hexahedron; r, s ≥ 0, r + s ≤ 1 in the triangle of a wedge and −1 … 1
-//! along its third axis; r, s, t ≥ 0, r + s + t ≤ 1 in a tetrahedron.
+//! Natural coordinates: −1 … 1 along each axis of a hexahedron; r, s ≥ 0, r + s ≤ 1 in the triangle of a
+//! wedge and −1 … 1 along its third axis; r, s, t ≥ 0, r + s + t ≤ 1 in a tetrahedron.
 
 use super::{CORNERS, WIDE, WIDE_POINTS};
 use crate::shape::Shape;
@@ -150,7 +151,8 @@ pub fn middle(shape: Shape) -> [f64; 3] {
 pub const GAUSS_3: [(f64, f64); 3] =
     [(-0.774_596_669_241_483_4, 5.0 / 9.0), (0.0, 8.0 / 9.0), (0.774_596_669_241_483_4, 5.0 / 9.0)];
 
-/// Dunavant's rule of degree 4 on a triangle: two orbits of three points (coordinate that two share, weight over ½).
+/// Dunavant's rule of degree 4 on a triangle: two orbits of three points (coordinate that two share, weight
+/// over ½).
 pub const DUNAVANT: [(f64, f64); 2] = [
     (0.445_948_490_915_964_9, 0.223_381_589_678_011_47),
     (0.091_576_213_509_770_74, 0.109_951_743_655_321_87),
@@ -164,8 +166,8 @@ pub fn dunavant() -> impl Iterator<Item = ([f64; 2], f64)> {
     })
 }
 
-/// Integration points and weights. All but the wedge's are exact for products of two shape functions of an element with
-/// straight edges; point g of a 6-node wedge lies nearest to its corner g.
+/// Integration points and weights. All but the wedge's are exact for products of two shape functions of an
+/// element with straight edges; point g of a 6-node wedge lies nearest to its corner g.
 fn points(shape: Shape) -> Vec<([f64; 3], f64)> {
     match shape {
         Shape::Wedge => {
@@ -221,7 +223,8 @@ impl Rule {
 mod tests {
     use super::*;
 
-    /// N is 1 at its own node and 0 at the others, all add up to 1, and gradients are those of finite differences.
+    /// N is 1 at its own node and 0 at the others, all add up to 1, and gradients are those of finite
+    /// differences.
     #[test]
     fn shape_functions_belong_to_their_nodes() {
         for shape in Shape::ALL {

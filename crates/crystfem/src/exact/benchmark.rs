@@ -3,9 +3,9 @@
 use super::{Wall, root};
 use std::f64::consts::PI;
 
-/// Temperature, K, at the end of a rod that is held at `hot` at the other end and radiates to `ambient`: the root of
-/// k/L (T_h − T) = εσ (T⁴ − T_a⁴). `conductance` is k/L, `radiation` εσ. T2 of NAFEMS. NaN unless both are above 0 and
-/// T_h ≥ T_a ≥ 0.
+/// Temperature, K, at the end of a rod that is held at `hot` at the other end and radiates to `ambient`: the
+/// root of k/L (T_h − T) = εσ (T⁴ − T_a⁴). `conductance` is k/L, `radiation` εσ. T2 of NAFEMS. NaN unless
+/// both are above 0 and T_h ≥ T_a ≥ 0.
 pub fn radiating_rod(hot: f64, ambient: f64, conductance: f64, radiation: f64) -> f64 {
     if !(conductance > 0.0 && radiation > 0.0 && ambient >= 0.0 && hot >= ambient) {
         return f64::NAN;
@@ -59,8 +59,8 @@ impl SwingingSlab {
     }
 }
 
-/// A plate 0 ≤ x ≤ a, 0 ≤ y ≤ b, held at 1 on y = 0, insulated on x = 0, with a film to 0 on x = a and y = b. T4 of
-/// NAFEMS.
+/// A plate 0 ≤ x ≤ a, 0 ≤ y ≤ b, held at 1 on y = 0, insulated on x = 0, with a film to 0 on x = a and y = b.
+/// T4 of NAFEMS.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CooledPlate {
     /// a and b, m.

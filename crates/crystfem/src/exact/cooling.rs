@@ -26,8 +26,8 @@ pub fn lumped_radiation(initial: f64, ambient: f64, rate: f64, time: f64) -> f64
     if ambient == 0.0 {
         return (initial.powi(-3) + 3.0 * progress).powf(-1.0 / 3.0);
     }
-    // the unknown is w = ln|T − T_s|, in which nothing is lost near the end; the slope (T⁴ − T_s⁴)/(T − T_s) lies
-    // between its values at both ends
+    // the unknown is w = ln|T − T_s|, in which nothing is lost near the end; the slope (T⁴ − T_s⁴)/(T − T_s)
+    // lies between its values at both ends
     let sign = if initial > ambient { 1.0 } else { -1.0 };
     let start = (initial - ambient).abs().ln();
     let slope = |t: f64| (t + ambient) * (t * t + ambient * ambient);
@@ -58,8 +58,8 @@ fn primitive(w: f64, ambient: f64, sign: f64) -> f64 {
     (near - p.atan()) / (2.0 * ambient.powi(3))
 }
 
-/// Rise of temperature when a body without exchange crystallizes: ΔT = ΔH X∞/c, K, with `enthalpy` ΔH of the crystal,
-/// J/kg, and `crystallinity` X∞ its share.
+/// Rise of temperature when a body without exchange crystallizes: ΔT = ΔH X∞/c, K, with `enthalpy` ΔH of the
+/// crystal, J/kg, and `crystallinity` X∞ its share.
 pub fn adiabatic_rise(enthalpy: f64, crystallinity: f64, specific_heat: f64) -> f64 {
     enthalpy * crystallinity / specific_heat
 }

@@ -1,10 +1,11 @@
-//! A cube whose finite elements have a closed form: three faces through the origin held, the others insulated.
+//! A cube whose finite elements have a closed form: three faces through the origin held, the others
+//! insulated.
 //!
-//! On equal cubes of edge h the products of sin((m + ½)πj/N) are the eigenvectors of the conduction matrix and of the
-//! lumped capacity together, with c_d = cos((m_d + ½)π/N) and
-//! λ = (α/h²) Σ_d 2(1 − c_d) Π_{e≠d} (2 + c_e)/3. With them both the solution in continuous time (e^{−λt}) and that of a
-//! scheme (a product of its amplifications) are known to rounding: errors of time steps and of linear solvers have
-//! nothing of the error in space.
+//! On equal cubes of edge h the products of sin((m + ½)πj/N) are the eigenvectors of the conduction matrix
+//! and of the lumped capacity together, with c_d = cos((m_d + ½)π/N) and λ = (α/h²) Σ_d 2(1 − c_d) Π_{e≠d} (2
+//! + c_e)/3. With them both the solution in continuous time (e^{−λt}) and that of a scheme (a product of its
+//! amplifications) are known to rounding: errors of time steps and of linear solvers have nothing of the
+//! error in space.
 
 use crate::boundary::{Condition, Field};
 use crate::material::{Conductor, Property};
@@ -70,7 +71,8 @@ impl Cube {
         Ok(Problem { conditions, initial, ..Problem::new(mesh, material, HOT) })
     }
 
-    /// Temperatures of all nodes, x fastest, where each eigenvector has been multiplied by `factor` of its λ (1/s).
+    /// Temperatures of all nodes, x fastest, where each eigenvector has been multiplied by `factor` of its λ
+    /// (1/s).
     pub fn exact(&self, factor: impl Fn(f64) -> f64) -> Vec<f64> {
         let count = self.elements;
         let angle = |mode: usize| (mode as f64 + 0.5) * PI / count as f64;
@@ -128,7 +130,8 @@ mod tests {
     use super::*;
     use crate::exact::Wall;
 
-    /// The start comes back, and on many elements the product of three walls with held faces (Carslaw & Jaeger).
+    /// The start comes back, and on many elements the product of three walls with held faces (Carslaw &
+    /// Jaeger).
     #[test]
     fn the_closed_form() {
         for start in [Start::Smooth, Start::Quenched] {

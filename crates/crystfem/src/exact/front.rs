@@ -2,8 +2,8 @@
 
 use super::{erfcx, root};
 
-/// λ of the front x = 2λ√(αt) in Stefan's problem, λ e^{λ²} erf λ = Ste/√π, Ste = c (T_m − T_s)/L (Carslaw & Jaeger,
-/// 11.2); 0 at Ste = 0, NaN below.
+/// λ of the front x = 2λ√(αt) in Stefan's problem, λ e^{λ²} erf λ = Ste/√π, Ste = c (T_m − T_s)/L (Carslaw &
+/// Jaeger, 11.2); 0 at Ste = 0, NaN below.
 pub fn stefan_root(stefan: f64) -> f64 {
     if stefan.is_nan() || stefan < 0.0 {
         return f64::NAN;
@@ -14,8 +14,8 @@ pub fn stefan_root(stefan: f64) -> f64 {
     root(0.0, greatest, |root| sought - (root.ln() + root * root + libm::erf(root).ln()))
 }
 
-/// A half space of melt that freezes from its held surface on, with two conductors and a latent heat at one temperature
-/// (Neumann's solution, Carslaw & Jaeger, 11.2). The densities of both are one.
+/// A half space of melt that freezes from its held surface on, with two conductors and a latent heat at one
+/// temperature (Neumann's solution, Carslaw & Jaeger, 11.2). The densities of both are one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Freezing {
     /// Conductivities of solid and melt, W/(m K).
@@ -35,9 +35,8 @@ pub struct Freezing {
 }
 
 impl Freezing {
-    /// λ of the front x = 2λ√(α_s t):
-    /// e^{−λ²}/erf λ − (k_l/k_s) ν (T_i − T_m)/(T_m − T_s) e^{−ν²λ²}/erfc(νλ) = λ L √π/(c (T_m − T_s)), ν = √(α_s/α_l).
-    /// NaN where temperatures are not in their order.
+    /// λ of the front x = 2λ√(α_s t): e^{−λ²}/erf λ − (k_l/k_s) ν (T_i − T_m)/(T_m − T_s) e^{−ν²λ²}/erfc(νλ)
+    /// = λ L √π/(c (T_m − T_s)), ν = √(α_s/α_l). NaN where temperatures are not in their order.
     pub fn root(&self) -> f64 {
         let fall = self.melting - self.surface;
         let ordered = fall > 0.0 && self.initial >= self.melting && self.latent_heat >= 0.0;

@@ -19,8 +19,8 @@ impl HalfSpace {
         self.conductivity / self.diffusivity.sqrt()
     }
 
-    /// T = T_s + (T_i − T_s) erf(x/2√(αt)), K, with the surface held at `surface` from t = 0 on (Carslaw & Jaeger, 2.4).
-    /// `surface` at depth 0 and the initial temperature elsewhere at t = 0.
+    /// T = T_s + (T_i − T_s) erf(x/2√(αt)), K, with the surface held at `surface` from t = 0 on (Carslaw &
+    /// Jaeger, 2.4). `surface` at depth 0 and the initial temperature elsewhere at t = 0.
     pub fn held(&self, surface: f64, depth: f64, time: f64) -> f64 {
         surface + (self.initial - surface) * libm::erf(self.similarity(depth, time))
     }
@@ -30,9 +30,9 @@ impl HalfSpace {
         self.conductivity * (self.initial - surface) / (std::f64::consts::PI * self.diffusivity * time).sqrt()
     }
 
-    /// T under a film of coefficient `film`, W/(m² K), with `ambient` beyond it, K:
-    /// (T − T_i)/(T_a − T_i) = erfc η − e^{hx/k + h²αt/k²} erfc(η + h√(αt)/k), η = x/2√(αt) (Carslaw & Jaeger, 2.7).
-    /// The product is e^{−η²} erfcx(η + h√(αt)/k), which neither overflows nor cancels, for any h from 0 to infinity.
+    /// T under a film of coefficient `film`, W/(m² K), with `ambient` beyond it, K: (T − T_i)/(T_a − T_i) =
+    /// erfc η − e^{hx/k + h²αt/k²} erfc(η + h√(αt)/k), η = x/2√(αt) (Carslaw & Jaeger, 2.7). The product is
+    /// e^{−η²} erfcx(η + h√(αt)/k), which neither overflows nor cancels, for any h from 0 to infinity.
     pub fn film(&self, film: f64, ambient: f64, depth: f64, time: f64) -> f64 {
         if film.is_infinite() {
             return self.held(ambient, depth, time);
@@ -75,7 +75,8 @@ impl Contact {
         (lower * self.lower.initial + upper * self.upper.initial) / (lower + upper)
     }
 
-    /// T at `place` (m, negative in the lower body), K: each body is one with its surface held at the contact's.
+    /// T at `place` (m, negative in the lower body), K: each body is one with its surface held at the
+    /// contact's.
     pub fn temperature(&self, place: f64, time: f64) -> f64 {
         let body = if place < 0.0 { self.lower } else { self.upper };
         body.held(self.temperature_of_contact(), place.abs(), time)
@@ -89,8 +90,8 @@ mod tests {
     /// PA12 of `reference/ch4/analytic.py`.
     const PA12: HalfSpace = HalfSpace { conductivity: 0.25, diffusivity: 1.125_112_511e-7, initial: 493.15 };
 
-    // formulation.md, "Verification problems": x = 2 mm, t = 20 s, surface and ambient 353.15 K; its nine decimals follow
-    // from α given with ten digits
+    // formulation.md, "Verification problems": x = 2 mm, t = 20 s, surface and ambient 353.15 K; its nine
+    // decimals follow from α given with ten digits
     #[test]
     fn figures_of_the_formulation() {
         assert!((PA12.held(353.15, 2e-3, 20.0) - 444.737_621_471).abs() < 5e-8);

@@ -1,7 +1,7 @@
 //! Closed-form solutions of heat conduction: what results are compared with.
 //!
-//! Arguments outside their domain (negative times or conductivities, what is not a number) give NaN or the limit named;
-//! nothing panics.
+//! Arguments outside their domain (negative times or conductivities, what is not a number) give NaN or the
+//! limit named; nothing panics.
 
 mod benchmark;
 mod cooling;
@@ -18,11 +18,11 @@ pub use half_space::{Contact, HalfSpace};
 pub use manufactured::Manufactured;
 pub use wall::{Wall, steady_wall};
 
-/// Complementary error function over the Gaussian: erfcx x = e^{x²} erfc x, within 5e-16 of its value for x > −26;
-/// below, e^{x²} is beyond the largest number and infinity comes back.
+/// Complementary error function over the Gaussian: erfcx x = e^{x²} erfc x, within 5e-16 of its value for x >
+/// −26; below, e^{x²} is beyond the largest number and infinity comes back.
 ///
-/// Up to 25 both factors are taken as they are, with the rounding of x² carried along; beyond, the asymptotic series
-/// (Abramowitz & Stegun 7.1.23) of which the eighth term is below 1e-17.
+/// Up to 25 both factors are taken as they are, with the rounding of x² carried along; beyond, the asymptotic
+/// series (Abramowitz & Stegun 7.1.23) of which the eighth term is below 1e-17.
 pub fn erfcx(x: f64) -> f64 {
     if x < 25.0 {
         let square = x * x;

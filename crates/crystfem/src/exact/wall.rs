@@ -3,8 +3,8 @@
 use super::half_space::film_share;
 use super::root;
 
-/// A wall of half thickness L with films on both faces, or of thickness L with one face insulated; ξ = x/L is 0 in the
-/// middle (at the insulated face) and 1 at the film. θ = (T − T_a)/(T_i − T_a).
+/// A wall of half thickness L with films on both faces, or of thickness L with one face insulated; ξ = x/L is
+/// 0 in the middle (at the insulated face) and 1 at the film. θ = (T − T_a)/(T_i − T_a).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wall {
     /// Bi = hL/k, from 0 (insulated) to infinity (held faces).
@@ -20,10 +20,11 @@ impl Wall {
         (whole, rest)
     }
 
-    /// θ at ξ after Fo = αt/L²: Σ 4 sin ζ/(2ζ + sin 2ζ) e^{−ζ²Fo} cos ζξ (Carslaw & Jaeger, 3.11), within 1e-13.
+    /// θ at ξ after Fo = αt/L²: Σ 4 sin ζ/(2ζ + sin 2ζ) e^{−ζ²Fo} cos ζξ (Carslaw & Jaeger, 3.11), within
+    /// 1e-13.
     ///
-    /// Below Fo = 0.02 the two faces are half spaces (the wave of one has fallen below 1e-21 at the other), above it
-    /// twenty terms are enough (e^{−ζ²Fo} < 1e-30 after them).
+    /// Below Fo = 0.02 the two faces are half spaces (the wave of one has fallen below 1e-21 at the other),
+    /// above it twenty terms are enough (e^{−ζ²Fo} < 1e-30 after them).
     pub fn share(&self, place: f64, fourier: f64) -> f64 {
         if fourier.is_nan() || fourier < 0.0 || self.biot.is_nan() || self.biot < 0.0 {
             return f64::NAN;
@@ -53,8 +54,8 @@ impl Wall {
     }
 }
 
-/// T at ξ = x/L between two held faces, K, for k = k₀ (1 + b (T − T₀)): Kirchhoff's u = T − T₀ + b (T − T₀)²/2 is linear
-/// in x. `slope` is b, 1/K; `reference` T₀, K. NaN where k is not positive at both faces.
+/// T at ξ = x/L between two held faces, K, for k = k₀ (1 + b (T − T₀)): Kirchhoff's u = T − T₀ + b (T −
+/// T₀)²/2 is linear in x. `slope` is b, 1/K; `reference` T₀, K. NaN where k is not positive at both faces.
 pub fn steady_wall(faces: [f64; 2], slope: f64, reference: f64, place: f64) -> f64 {
     let [a, b] = faces.map(|face| face - reference);
     if !(1.0 + slope * a > 0.0 && 1.0 + slope * b > 0.0) {

@@ -11,8 +11,8 @@ use std::f64::consts::LN_2;
 /// Estimates: `half_time` t_½ in s, `avrami_exponent` n, `rate_constant` k = ln 2/t_½ⁿ in s⁻ⁿ.
 ///
 /// # Errors
-/// [`Error::Data`] for columns of different lengths, times that are negative, α outside [`super::DEGREES`], NaN, too few
-/// measurements or constant ones, and data that do not determine both constants.
+/// [`Error::Data`] for columns of different lengths, times that are negative, α outside [`super::DEGREES`],
+/// NaN, too few measurements or constant ones, and data that do not determine both constants.
 pub fn avrami(times: &[f64], degrees: &[f64]) -> Result<Fit, Error> {
     let what = "fit of Avrami's law";
     if times.len() != degrees.len() {

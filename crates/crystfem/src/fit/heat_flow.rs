@@ -12,10 +12,12 @@ pub enum Baseline {
     /// Straight between the heat flows at the limits.
     #[default]
     Linear,
-    /// From the heat flow at the first limit to that at the second in proportion to α: a step of the heat capacity.
+    /// From the heat flow at the first limit to that at the second in proportion to α: a step of the heat
+    /// capacity.
     Sigmoidal,
-    /// From the tangent before the first limit to the tangent after the second in proportion to α. The tangents are
-    /// least-squares lines through the measurements up to a tenth of the width away from the limits.
+    /// From the tangent before the first limit to the tangent after the second in proportion to α. The
+    /// tangents are least-squares lines through the measurements up to a tenth of the width away from the
+    /// limits.
     Tangential,
 }
 
@@ -44,14 +46,15 @@ pub struct Peak {
 }
 
 impl Peak {
-    /// Integrates the heat given off, W/kg, at `times`, s, between `limits`, s, by the trapezoidal rule; the heat flow is
-    /// linear between measurements. B = (1 − α) B₁ + α B₂ with lines B₁ and B₂ through the limits is iterated with α; see
-    /// Höhne, Hemminger & Flammersheim, Differential Scanning Calorimetry (2003).
+    /// Integrates the heat given off, W/kg, at `times`, s, between `limits`, s, by the trapezoidal rule; the
+    /// heat flow is linear between measurements. B = (1 − α) B₁ + α B₂ with lines B₁ and B₂ through the
+    /// limits is iterated with α; see Höhne, Hemminger & Flammersheim, Differential Scanning Calorimetry
+    /// (2003).
     ///
     /// # Errors
-    /// [`Error::Data`] for columns of different lengths, numbers that are not finite, times that decrease, limits that are
-    /// not in order within the times, too few rows for a tangent, and a baseline that does not converge;
-    /// [`Error::Parameter`] for an enthalpy that is not above 0.
+    /// [`Error::Data`] for columns of different lengths, numbers that are not finite, times that decrease,
+    /// limits that are not in order within the times, too few rows for a tangent, and a baseline that does
+    /// not converge; [`Error::Parameter`] for an enthalpy that is not above 0.
     pub fn of(times: &[f64], flows: &[f64], limits: [f64; 2], baseline: Baseline) -> Result<Self, Error> {
         let what = "integration of a heat flow";
         let refuse = |reason: String| Error::Data { what: what.to_owned(), reason };
@@ -222,7 +225,8 @@ mod tests {
         assert!(found[2][0] < 1e-5 && found[2][1] < 1e-6, "{found:?}");
     }
 
-    /// Limits in the flanks of the peak, between rows, and four times the rows: chords, α and ΔH have closed forms, both come back to second order.
+    /// Limits in the flanks of the peak, between rows, and four times the rows: chords, α and ΔH have closed
+    /// forms, both come back to second order.
     #[test]
     fn limits_in_the_flanks() {
         // a third of a step behind a row, at every refinement
@@ -244,8 +248,8 @@ mod tests {
         }
     }
 
-    /// A step of the heat capacity, by levels and by lines: the truth is B = (1 − α) B₁ + α B₂, which a straight baseline
-    /// misses by several per cent.
+    /// A step of the heat capacity, by levels and by lines: the truth is B = (1 − α) B₁ + α B₂, which a
+    /// straight baseline misses by several per cent.
     #[test]
     fn a_step_of_the_heat_capacity() {
         for (baseline, slopes) in [(Baseline::Sigmoidal, [0.0, 0.0]), (Baseline::Tangential, [1.0, 0.4])] {

@@ -12,8 +12,8 @@ pub type Residuals<'a> = dyn Fn(&[f64]) -> Option<Vec<f64>> + 'a;
 /// A residual that no step is accepted with.
 const REJECTED: f64 = 1e100;
 
-/// Relative least eigenvalue of the normal matrix, its columns scaled to 1, below which the parameters are not
-/// determined: differences carry 1e-10, which it squares with the condition.
+/// Relative least eigenvalue of the normal matrix, its columns scaled to 1, below which the parameters are
+/// not determined: differences carry 1e-10, which it squares with the condition.
 const COLLINEAR: f64 = 1e-12;
 
 /// Step of differences of a residual that is exact to rounding: ∛ε, good to 1e-10.
@@ -52,7 +52,8 @@ impl Minimum {
     }
 }
 
-/// The best minimum over all starts of `count` residuals, with derivatives by central differences of a relative `step`.
+/// The best minimum over all starts of `count` residuals, with derivatives by central differences of a
+/// relative `step`.
 ///
 /// # Errors
 /// [`Error::Data`] if no start arrives anywhere, or if the data do not determine the parameters.

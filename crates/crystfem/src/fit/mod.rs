@@ -47,7 +47,8 @@ pub struct Estimate {
     pub value: f64,
     /// Standard error.
     pub standard_error: f64,
-    /// Interval that holds the true value with a probability of 95 %, where the law is nearly linear within it.
+    /// Interval that holds the true value with a probability of 95 %, where the law is nearly linear within
+    /// it.
     pub interval: [f64; 2],
 }
 
@@ -59,8 +60,8 @@ impl Fit {
 }
 
 impl Estimate {
-    /// Of a positive constant whose logarithm has the estimate `logarithm` and a standard error; the interval is
-    /// symmetric in the logarithm.
+    /// Of a positive constant whose logarithm has the estimate `logarithm` and a standard error; the interval
+    /// is symmetric in the logarithm.
     fn of_logarithm(name: &'static str, unit: &str, logarithm: f64, error: f64, degrees: usize) -> Self {
         let (value, reach) = (logarithm.exp(), quantile(degrees) * error);
         Self {

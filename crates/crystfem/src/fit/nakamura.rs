@@ -116,8 +116,9 @@ impl Run {
 /// Estimates: `growth_rate` K₀ in 1/s, `nucleation` K_G in K², `avrami_exponent` n.
 ///
 /// # Errors
-/// [`Error::Data`] for what [`avrami`](super::avrami) refuses too, times that decrease, and data that do not determine
-/// all three (one isothermal run, say); [`Error::Parameter`] for known constants out of their domain.
+/// [`Error::Data`] for what [`avrami`](super::avrami) refuses too, times that decrease, and data that do not
+/// determine all three (one isothermal run, say); [`Error::Parameter`] for known constants out of their
+/// domain.
 pub fn nakamura(runs: &[Run], known: &Known) -> Result<Fit, Error> {
     let what = "fit of Nakamura's and Hoffman–Lauritzen's constants";
     for run in runs {

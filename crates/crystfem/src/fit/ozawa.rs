@@ -42,8 +42,8 @@ pub fn rates_at(coolings: &[Cooling], temperature: f64) -> (Vec<f64>, Vec<f64>) 
 /// Estimates: `ozawa_exponent` m, `cooling_function` χ in (K/s)ᵐ.
 ///
 /// # Errors
-/// [`Error::Data`] for rates that are not above 0, fewer than three rates with 0.01 ≤ α ≤ 0.99 at this temperature, and
-/// data that do not determine both constants.
+/// [`Error::Data`] for rates that are not above 0, fewer than three rates with 0.01 ≤ α ≤ 0.99 at this
+/// temperature, and data that do not determine both constants.
 pub fn ozawa(coolings: &[Cooling], temperature: f64) -> Result<Fit, Error> {
     let what = format!("fit of Ozawa's law at {temperature} K ({:.2} degC)", temperature - 273.15);
     let refuse = |reason: String| Error::Data { what: what.clone(), reason };
@@ -66,7 +66,8 @@ pub fn ozawa(coolings: &[Cooling], temperature: f64) -> Result<Fit, Error> {
         )));
     }
     check(&what, &degrees, 2)?;
-    // parameters: m and ln χ − m ln q̄, with the mean q̄ of the logarithms, so that both are nearly uncorrelated
+    // parameters: m and ln χ − m ln q̄, with the mean q̄ of the logarithms, so that both are nearly
+    // uncorrelated
     let middle = rates.iter().map(|q| q.ln()).sum::<f64>() / rates.len() as f64;
     let model = |p: &[f64]| -> Vec<f64> {
         rates.iter().map(|q| -(-(p[1] - p[0] * (q.ln() - middle)).exp()).exp_m1()).collect()

@@ -16,8 +16,8 @@ pub type Model<'a> = dyn Fn(&Constants) -> Option<Vec<[f64; 2]>> + 'a;
 /// Estimates: `growth_rate` K₀ in 1/s, `nucleation` K_G in K².
 ///
 /// # Errors
-/// [`Error::Data`] for what [`avrami`](super::avrami) refuses too, a model that fails at `start`, a part that does not crystallize there, and curves that do
-/// not determine both constants (of one temperature, say).
+/// [`Error::Data`] for what [`avrami`](super::avrami) refuses too, a model that fails at `start`, a part that
+/// does not crystallize there, and curves that do not determine both constants (of one temperature, say).
 pub fn part(model: &Model, degrees: &[f64], start: &Constants) -> Result<Fit, Error> {
     let what = "fit of a part";
     let refuse = |reason: &str| Error::Data { what: what.to_owned(), reason: reason.to_owned() };
@@ -34,7 +34,8 @@ pub fn part(model: &Model, degrees: &[f64], start: &Constants) -> Result<Fit, Er
             "with the constants that the part has, no alpha is between 0.01 and 0.99 at any measurement",
         ));
     }
-    // parameters: ln of K where the part crystallizes, and of K_G. K₀ itself would be nearly collinear with K_G.
+    // parameters: ln of K where the part crystallizes, and of K_G. K₀ itself would be nearly collinear with
+    // K_G.
     let middle = sum / count;
     let melting = start.equilibrium_melting;
     let barrier = (middle + melting) / (2.0 * middle * middle * (melting - middle));

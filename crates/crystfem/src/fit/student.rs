@@ -2,8 +2,8 @@
 
 use polycore::numerics::bisected;
 
-/// t with P(|x| ≤ t) = 0.95 for Student's distribution of so many degrees of freedom (at least 1); Abramowitz &
-/// Stegun 26.7.3 and 26.7.4, inverted by bisection.
+/// t with P(|x| ≤ t) = 0.95 for Student's distribution of so many degrees of freedom (at least 1); Abramowitz
+/// & Stegun 26.7.3 and 26.7.4, inverted by bisection.
 pub fn quantile(degrees: usize) -> f64 {
     if degrees > 2000 {
         // 26.7.5: its next term is below 1e-9 there

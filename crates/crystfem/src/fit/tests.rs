@@ -244,8 +244,9 @@ proptest::proptest! {
     }
 }
 
-/// What a fit predicts beyond its data, the temperature at α = ½ on cooling at 40 K/min, is as uncertain as its draws say: its spread over
-/// repeated measurements is that of the draws, and their 95 % bands hold the true value as often as they should.
+/// What a fit predicts beyond its data, the temperature at α = ½ on cooling at 40 K/min, is as uncertain as
+/// its draws say: its spread over repeated measurements is that of the draws, and their 95 % bands hold the
+/// true value as often as they should.
 #[test]
 fn draws_predict_what_repeated_measurements_give() {
     let half = |kinetics: &Kinetics| {

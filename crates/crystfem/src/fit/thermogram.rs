@@ -21,7 +21,8 @@ pub struct MeasuredPeak {
     pub peak: Peak,
     /// Temperatures there, K; empty of an isothermal run.
     pub temperatures: Vec<f64>,
-    /// Times, s, and temperatures, K, of the rows before it, from the last one at which nothing can crystallize.
+    /// Times, s, and temperatures, K, of the rows before it, from the last one at which nothing can
+    /// crystallize.
     pub history: Vec<[f64; 2]>,
 }
 
@@ -36,7 +37,8 @@ impl Thermogram {
         })
     }
 
-    /// Integrates the peak between two times, s, of a material that cannot crystallize at and above `melting`, K.
+    /// Integrates the peak between two times, s, of a material that cannot crystallize at and above
+    /// `melting`, K.
     ///
     /// # Errors
     /// Those of [`Peak::of`].

@@ -29,8 +29,8 @@ const GAUSS_5: [[f64; 2]; 5] = [
     [0.906_179_845_938_664, 0.236_926_885_056_189_08],
 ];
 
-/// Cools from `start` to `end`, K, at `rate`, K/s, from a relative crystallinity. Gauss' rule of five points on at
-/// least `points − 1` intervals of at most 0.25 K: exact to rounding.
+/// Cools from `start` to `end`, K, at `rate`, K/s, from a relative crystallinity. Gauss' rule of five points
+/// on at least `points − 1` intervals of at most 0.25 K: exact to rounding.
 pub fn cooling_curve(
     kinetics: &Kinetics,
     rate: f64,

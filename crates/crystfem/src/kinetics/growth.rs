@@ -3,12 +3,12 @@
 use super::{Constants, Kinetics, LARGEST_Z};
 use crate::simd_math::exp;
 
-/// Panels into which (T∞, T₀) is divided; an increment is integrated panel by panel. The error in α of one panel
-/// of PA12 (5.4 K) is about 1e-5 at worst, and of steps of 1 K 3e-8.
+/// Panels into which (T∞, T₀) is divided; an increment is integrated panel by panel. The error in α of one
+/// panel of PA12 (5.4 K) is about 1e-5 at worst, and of steps of 1 K 3e-8.
 pub const PANELS: usize = 32;
 
-/// Increments below this part of a panel are integrated in one piece even across a border: K is smooth there, and the
-/// error of the rule is below 1e-13.
+/// Increments below this part of a panel are integrated in one piece even across a border: K is smooth there,
+/// and the error of the rule is below 1e-13.
 const WHOLE: f64 = 0.01;
 
 /// Δz and ∂Δz/∂T at the end of the increment, at fixed Δt.
@@ -56,7 +56,8 @@ impl Kinetics {
 }
 
 impl Kinetics {
-    /// Δz of increments that lie each within one of `count` panels; NaN for the others, and for what is not finite.
+    /// Δz of increments that lie each within one of `count` panels; NaN for the others, and for what is not
+    /// finite.
     ///
     /// To inline into functions that `pulp` dispatches: the loop is one of vectors.
     #[inline(always)]

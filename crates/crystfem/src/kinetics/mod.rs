@@ -1,8 +1,8 @@
 //! Crystallization from the melt: Nakamura's theory with the rate of Hoffman and Lauritzen, carried in z.
 //!
-//! With z = \[−ln(1−α)\]^{1/n} the rate equation (4.5) becomes dz/dt = K(T): a quadrature. It is stable for any step,
-//! α = 0 is no fixed point of it, and α = 1 − exp(−zⁿ) never leaves \[0, 1\]. z carries both ends without
-//! cancellation: α → 0 as zⁿ, 1 − α as exp(−zⁿ).
+//! With z = \[−ln(1−α)\]^{1/n} the rate equation (4.5) becomes dz/dt = K(T): a quadrature. It is stable for
+//! any step, α = 0 is no fixed point of it, and α = 1 − exp(−zⁿ) never leaves \[0, 1\]. z carries both ends
+//! without cancellation: α → 0 as zⁿ, 1 − α as exp(−zⁿ).
 
 mod exact;
 mod growth;
@@ -82,8 +82,8 @@ impl Kinetics {
     /// From constants.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for K₀ or K_G ≤ 0, U < 0, T∞ < 0 K, T₀ ≤ T∞, n outside \[1, 10\] (below 1 the rate dα/dt
-    /// would be infinite at α = 0), and for what is not finite.
+    /// [`Error::Parameter`] for K₀ or K_G ≤ 0, U < 0, T∞ < 0 K, T₀ ≤ T∞, n outside \[1, 10\] (below 1 the
+    /// rate dα/dt would be infinite at α = 0), and for what is not finite.
     pub fn new(constants: Constants) -> Result<Self, Error> {
         let Constants {
             growth_rate,
@@ -125,8 +125,8 @@ impl Kinetics {
         &self.constants
     }
 
-    /// K(T) = (ln 2)^{1/n} K₀ exp(−U/(R(T−T∞))) exp(−K_G(T+T₀)/(2T²(T₀−T))), 1/s, Eqs (4.6) and (4.7); 0 outside
-    /// (T∞, T₀), into which it runs smoothly.
+    /// K(T) = (ln 2)^{1/n} K₀ exp(−U/(R(T−T∞))) exp(−K_G(T+T₀)/(2T²(T₀−T))), 1/s, Eqs (4.6) and (4.7); 0
+    /// outside (T∞, T₀), into which it runs smoothly.
     #[inline]
     pub fn rate(&self, temperature: f64) -> f64 {
         let Constants { nucleation, equilibrium_melting, frozen, .. } = self.constants;
@@ -157,7 +157,8 @@ impl Kinetics {
         self.activation / (above * above) - barrier * change
     }
 
-    /// Half time of an isothermal crystallization t_½ = (ln 2)^{1/n}/K, s, Eq. (4.6); infinite outside (T∞, T₀).
+    /// Half time of an isothermal crystallization t_½ = (ln 2)^{1/n}/K, s, Eq. (4.6); infinite outside (T∞,
+    /// T₀).
     pub fn half_time(&self, temperature: f64) -> f64 {
         std::f64::consts::LN_2.powf(self.constants.avrami_exponent.recip()) / self.rate(temperature)
     }
@@ -180,7 +181,8 @@ impl Kinetics {
         (-self.power(z)).exp()
     }
 
-    /// z of a relative crystallinity α in \[0, 1\]; where α is near 1, [`Kinetics::z_of_remainder`] keeps digits.
+    /// z of a relative crystallinity α in \[0, 1\]; where α is near 1, [`Kinetics::z_of_remainder`] keeps
+    /// digits.
     pub fn z_of_degree(&self, degree: f64) -> f64 {
         self.root(-(-degree).ln_1p())
     }
@@ -230,7 +232,8 @@ impl Kinetics {
         self.root(power)
     }
 
-    /// dα/dt = n K (1−α) \[ln 1/(1−α)\]^{(n−1)/n}, 1/s, Eq. (4.5), as printed: not guarded, a NaN beyond α = 1.
+    /// dα/dt = n K (1−α) \[ln 1/(1−α)\]^{(n−1)/n}, 1/s, Eq. (4.5), as printed: not guarded, a NaN beyond α =
+    /// 1.
     pub fn degree_rate(&self, temperature: f64, degree: f64) -> f64 {
         let n = self.constants.avrami_exponent;
         n * self.rate(temperature) * (1.0 - degree) * (-(-degree).ln_1p()).powf((n - 1.0) / n)

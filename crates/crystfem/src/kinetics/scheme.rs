@@ -2,8 +2,8 @@
 
 use super::Kinetics;
 
-/// A one-step scheme. The first two advance α by Eq. (4.5), as the thesis does, and may leave \[0, 1\]; the others
-/// advance z.
+/// A one-step scheme. The first two advance α by Eq. (4.5), as the thesis does, and may leave \[0, 1\]; the
+/// others advance z.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scheme {
     /// Euler's method in α, Eq. (4.10).

@@ -27,7 +27,8 @@ fn kinetics_table() {
     }
 }
 
-/// formulation.md: K_max = 0.1028 /s at 128.3 °C and 0.1163 /s at 127.1 °C; half times of `reference/ch4/curves.txt`.
+/// formulation.md: K_max = 0.1028 /s at 128.3 °C and 0.1163 /s at 127.1 °C; half times of
+/// `reference/ch4/curves.txt`.
 #[test]
 fn fastest_and_half_times() {
     for (kinetics, temperature, rate, half) in
@@ -251,7 +252,8 @@ fn growth_is_the_integral() {
 }
 
 proptest::proptest! {
-    /// Finite, not negative, at most K_max Δt; its derivative is that of finite differences; continuous in the end.
+    /// Finite, not negative, at most K_max Δt; its derivative is that of finite differences; continuous in
+    /// the end.
     #[test]
     fn growth_over_any_increment(
         start in 73.15..1273.15_f64, change in -1200.0..1200.0_f64, scale in 0..7_i32, dt in -3.0..9.0_f64,

@@ -12,9 +12,9 @@ pub enum Sign {
     Mended,
 }
 
-/// Appendix B after its three missing parentheses are put in. The arithmetic is the printed one, in single precision
-/// where the variables are `REAL`; temperatures are those at the start of the increment. Whatever it does with α, infinite
-/// and NaN included, stands in the state; energy and flux do not depend on it.
+/// Appendix B after its three missing parentheses are put in. The arithmetic is the printed one, in single
+/// precision where the variables are `REAL`; temperatures are those at the start of the increment. Whatever
+/// it does with α, infinite and NaN included, stands in the state; energy and flux do not depend on it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AsPublished {
     conductor: Conductor,

@@ -4,7 +4,8 @@ use super::{Point, Property, Response, ThermalMaterial};
 use crate::error::Error;
 use nalgebra::{Matrix3, Vector3};
 
-/// A conductor without state: U = ∫c dT, f = −k(T) D ∇T, D diagonal: along beads a part conducts better than across.
+/// A conductor without state: U = ∫c dT, f = −k(T) D ∇T, D diagonal: along beads a part conducts better than
+/// across.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Conductor {
     density: f64,

@@ -32,12 +32,12 @@ pub struct Grown {
 }
 
 impl Crystallization {
-    /// From z at the start over an increment in which the temperature runs linearly from `start` to `end`, K, in the
-    /// time `dt`, s.
+    /// From z at the start over an increment in which the temperature runs linearly from `start` to `end`, K,
+    /// in the time `dt`, s.
     ///
-    /// On cooling and at a hold z grows by ∫K dt. On heating each panel of temperature takes half of its growth, then
-    /// α ← α (1−X_m(T₂))/(1−X_m(T₁)), then the other half: z and α stay within their bounds whatever the
-    /// increment, and the end is a continuous function of its temperature.
+    /// On cooling and at a hold z grows by ∫K dt. On heating each panel of temperature takes half of its
+    /// growth, then α ← α (1−X_m(T₂))/(1−X_m(T₁)), then the other half: z and α stay within their bounds
+    /// whatever the increment, and the end is a continuous function of its temperature.
     pub fn advance(&self, z: f64, start: f64, end: f64, dt: f64) -> Grown {
         let kinetics = &self.kinetics;
         let melting = match &self.melting {

@@ -5,8 +5,9 @@ use crate::error::Error;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// A material of which an element holds only a part, spread evenly over it: ρ and k are that part of the material's, and
-/// energies and states per mass are the material's own (rule of mixtures with air that neither stores nor conducts).
+/// A material of which an element holds only a part, spread evenly over it: ρ and k are that part of the
+/// material's, and energies and states per mass are the material's own (rule of mixtures with air that
+/// neither stores nor conducts).
 #[derive(Clone)]
 pub struct Filled {
     /// The material.
@@ -28,8 +29,8 @@ impl Filled {
     }
 }
 
-/// Replaces materials by [`Filled`] ones, one for each material and filled part that elements have: `part_of` is the index
-/// of each element among `parts`.
+/// Replaces materials by [`Filled`] ones, one for each material and filled part that elements have: `part_of`
+/// is the index of each element among `parts`.
 ///
 /// # Errors
 /// Those of [`Filled::new`]; more than 65536 of them.

@@ -1,5 +1,5 @@
-//! Materials: Abaqus' UMATHT without side effects. (Input, old state) → (response, new state); the old state is never
-//! changed.
+//! Materials: Abaqus' UMATHT without side effects. (Input, old state) → (response, new state); the old state
+//! is never changed.
 
 mod as_published;
 mod conductor;
@@ -75,22 +75,22 @@ pub trait ThermalMaterial: Send + Sync {
     }
     /// U of material at rest at a temperature with a given state, J/kg: what birth brings in.
     fn energy(&self, temperature: f64, state: &[f64]) -> f64;
-    /// Whether U is linear in T and the flux in ∇T whatever the state (which may evolve all the same): no Newton
-    /// iteration is needed.
+    /// Whether U is linear in T and the flux in ∇T whatever the state (which may evolve all the same): no
+    /// Newton iteration is needed.
     fn is_linear(&self) -> bool;
-    /// Whether the flux is −k ∇T with the same k at any temperature and state: conduction is then assembled once, and
-    /// with lumped capacity the energy is requested at nodes only, with ∇T = 0.
+    /// Whether the flux is −k ∇T with the same k at any temperature and state: conduction is then assembled
+    /// once, and with lumped capacity the energy is requested at nodes only, with ∇T = 0.
     fn constant_conductivity(&self) -> bool {
         self.is_linear()
     }
-    /// Kirchhoff's potential θ = ∫k dT, W/m, and k at a temperature, where k depends on it so steeply that the flux
-    /// of elements must follow from θ at their nodes, f = −D ∇θ (see [`Property::jumps`]); `None`: f is that of
-    /// [`Self::respond`].
+    /// Kirchhoff's potential θ = ∫k dT, W/m, and k at a temperature, where k depends on it so steeply that
+    /// the flux of elements must follow from θ at their nodes, f = −D ∇θ (see [`Property::jumps`]); `None`: f
+    /// is that of [`Self::respond`].
     fn potential(&self, _temperature: f64) -> Option<[f64; 2]> {
         None
     }
-    /// The law by which the state evolves, where the state is its z alone: points of one law and one temperature history then share their
-    /// growth. `None`: only [`Self::respond`] knows.
+    /// The law by which the state evolves, where the state is its z alone: points of one law and one
+    /// temperature history then share their growth. `None`: only [`Self::respond`] knows.
     fn crystals(&self) -> Option<&Crystallization> {
         None
     }

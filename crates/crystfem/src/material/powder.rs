@@ -8,8 +8,9 @@ const ALONE: &[&str] = &["consolidated"];
 const STATES: &[&str] = &["z", "consolidated"];
 const FIELDS: &[&str] = &["alpha", "crystallinity", "consolidated"];
 
-/// Powder that consolidates once it is hot: the consolidated part p is the greatest that (T − `from`)/(`to` − `from`), between 0 and 1, has reached, and the
-/// conductivity is [φ + (1 − φ)p] times that of the solid. Density and specific heat are the material's: a bed that settles is not modelled.
+/// Powder that consolidates once it is hot: the consolidated part p is the greatest that (T − `from`)/(`to` −
+/// `from`), between 0 and 1, has reached, and the conductivity is [φ + (1 − φ)p] times that of the solid.
+/// Density and specific heat are the material's: a bed that settles is not modelled.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Powder<M> {
     of: M,
@@ -20,10 +21,12 @@ pub struct Powder<M> {
 }
 
 impl<M: ThermalMaterial> Powder<M> {
-    /// The solid, the conductivity of its powder over its own, and the temperatures, K, at which it begins and ends to consolidate.
+    /// The solid, the conductivity of its powder over its own, and the temperatures, K, at which it begins
+    /// and ends to consolidate.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a share that is not above 0, up to 1, and temperatures that are not above 0, increasing and finite.
+    /// [`Error::Parameter`] for a share that is not above 0, up to 1, and temperatures that are not above 0,
+    /// increasing and finite.
     pub fn new(of: M, share: f64, window: [f64; 2]) -> Result<Self, Error> {
         let refuse =
             |name, found, allowed: &str| Err(Error::Parameter { name, found, allowed: allowed.to_owned() });

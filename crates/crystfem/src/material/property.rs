@@ -43,8 +43,8 @@ impl Property {
     /// A table of temperatures, K, and values.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for no rows or unequal columns (with the number of rows), temperatures that do not increase,
-    /// and values that are not above 0 and finite.
+    /// [`Error::Parameter`] for no rows or unequal columns (with the number of rows), temperatures that do
+    /// not increase, and values that are not above 0 and finite.
     pub fn table(name: &'static str, temperatures: Vec<f64>, values: Vec<f64>) -> Result<Self, Error> {
         let refuse = |name, found, allowed: String| Err(Error::Parameter { name, found, allowed });
         if temperatures.is_empty() || temperatures.len() != values.len() {
@@ -166,7 +166,8 @@ mod tests {
         Property::table("specific heat, J/(kg K)", temperatures.to_vec(), values.to_vec())
     }
 
-    /// A parabola is the integral of a straight line: 1000 + 2 (T − 300) between 300 and 400 K, constant outside.
+    /// A parabola is the integral of a straight line: 1000 + 2 (T − 300) between 300 and 400 K, constant
+    /// outside.
     #[test]
     fn integral_is_exact() {
         let heat = table(&[300.0, 350.0, 400.0], &[1000.0, 1100.0, 1200.0]).unwrap();

@@ -1,8 +1,9 @@
 //! Growth and melting of crystals at many points of one law.
 //!
-//! Points at one node have one temperature history, whatever their z. What depends on that alone is computed once for each node: growth Δz, and
-//! on heating ln (1−X_m(T₂))/(1−X_m(T₁)), by which crystals become less. Both, and the melting of each point, are loops of vectors. Increments
-//! that cross borders of panels are cut there into pieces, which points pass one after another.
+//! Points at one node have one temperature history, whatever their z. What depends on that alone is computed
+//! once for each node: growth Δz, and on heating ln (1−X_m(T₂))/(1−X_m(T₁)), by which crystals become less.
+//! Both, and the melting of each point, are loops of vectors. Increments that cross borders of panels are cut
+//! there into pieces, which points pass one after another.
 
 use super::Crystallization;
 use super::crystallization::{FAINT, Grown, HEATING_PANELS, NOTHING};
@@ -54,8 +55,9 @@ struct Pieces {
 }
 
 impl Crystallization {
-    /// z of points over an increment, as [`Self::advance`] does; `node` is that of each point. Returns the wish for the next step over
-    /// this one: [`LARGEST_CHANGE`] over the largest change of α, if there is any. z becomes NaN where an increment is not finite.
+    /// z of points over an increment, as [`Self::advance`] does; `node` is that of each point. Returns the
+    /// wish for the next step over this one: [`LARGEST_CHANGE`] over the largest change of α, if there is
+    /// any. z becomes NaN where an increment is not finite.
     pub(crate) fn advance_all(
         &self,
         increments: Increments,
@@ -226,7 +228,8 @@ impl Seen {
     }
 }
 
-/// Growth and fall over increments: of nodes, NaN where borders of panels are crossed, or of pieces, in a second.
+/// Growth and fall over increments: of nodes, NaN where borders of panels are crossed, or of pieces, in a
+/// second.
 struct Histories<'a> {
     law: &'a Crystallization,
     start: &'a [f64],

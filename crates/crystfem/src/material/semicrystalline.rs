@@ -10,7 +10,8 @@ pub const LARGEST_CHANGE: f64 = 0.1;
 /// The largest suggested step over the one taken.
 pub(super) const LONGEST: f64 = 10.0;
 
-/// Names of the constants of growth and melting as other programs list them, in the order of [`Polymer::growth_and_melting`].
+/// Names of the constants of growth and melting as other programs list them, in the order of
+/// [`Polymer::growth_and_melting`].
 pub const CONSTANT_NAMES: [&str; 9] = [
     "growth_rate",
     "nucleation",
@@ -38,14 +39,16 @@ pub struct Polymer {
     pub melting: Option<Melting>,
     /// Ultimate crystallinity X∞: the mass fraction of crystals at α = 1.
     pub ultimate_crystallinity: f64,
-    /// Heat of fusion of crystal ΔH, J/kg; without it temperature and crystallinity are uncoupled, as in the thesis.
+    /// Heat of fusion of crystal ΔH, J/kg; without it temperature and crystallinity are uncoupled, as in the
+    /// thesis.
     pub latent_heat: Option<f64>,
     /// Relative crystallinity α of fresh material.
     pub seed: f64,
 }
 
 impl Polymer {
-    /// The constants of growth and melting, SI, by the names of [`CONSTANT_NAMES`]; 0, 0, 0 of crystals that never melt.
+    /// The constants of growth and melting, SI, by the names of [`CONSTANT_NAMES`]; 0, 0, 0 of crystals that
+    /// never melt.
     pub fn growth_and_melting(&self) -> [f64; 9] {
         let of = self.kinetics.constants();
         let [sharpness, shape, peak] = self.melting.map_or([0.0; 3], |melting| melting.constants());
@@ -78,8 +81,8 @@ impl Semicrystalline {
     /// From its parts.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a density ≤ 0, X∞ outside (0, 1], ΔH < 0, a seed outside \[0, 1), and for what is not
-    /// finite.
+    /// [`Error::Parameter`] for a density ≤ 0, X∞ outside (0, 1], ΔH < 0, a seed outside \[0, 1), and for
+    /// what is not finite.
     pub fn new(polymer: Polymer) -> Result<Self, Error> {
         let Polymer { ultimate_crystallinity, latent_heat, seed, kinetics, melting, .. } = polymer;
         let check = |name, found: f64, good: bool, allowed: &str| {
@@ -105,8 +108,8 @@ impl Semicrystalline {
         })
     }
 
-    /// PA12 of Chapter 4: k = 0.25 W/(m K), ρ = 1010 kg/m³, c = 2200 J/(kg K), kinetics of column 1 of Table 4.1, X∞ = 0.25,
-    /// 209 J/g of crystal.
+    /// PA12 of Chapter 4: k = 0.25 W/(m K), ρ = 1010 kg/m³, c = 2200 J/(kg K), kinetics of column 1 of Table
+    /// 4.1, X∞ = 0.25, 209 J/g of crystal.
     ///
     /// # Errors
     /// None: as [`Self::new`] for other constants.

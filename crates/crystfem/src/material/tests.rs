@@ -50,7 +50,8 @@ fn point(temperature: f64, increment: f64, dt: f64) -> Point {
     Point { temperature, increment, gradient: Vector3::new(100.0, -20.0, 3.0), dt }
 }
 
-/// Every law: tangents against finite differences, energy a function of temperature and state, the old state untouched.
+/// Every law: tangents against finite differences, energy a function of temperature and state, the old state
+/// untouched.
 #[test]
 fn tangents() {
     for (law, material) in all().iter().enumerate() {
@@ -116,7 +117,8 @@ fn follow(material: &dyn ThermalMaterial, start: f64, state: f64, path: &[(f64, 
     state
 }
 
-/// Erratum 6: the survival α (1−X_m(T₂))/(1−X_m(T₁)) is exact in one step or in many, falls with T, and ends at 0.
+/// Erratum 6: the survival α (1−X_m(T₂))/(1−X_m(T₁)) is exact in one step or in many, falls with T, and ends
+/// at 0.
 #[test]
 fn melting_by_survival() {
     let material = pa12(None);
@@ -280,7 +282,8 @@ mod printed {
         alphas
     }
 
-    /// Erratum 2: `DTEMP > 0` crystallizes. Cooling 200 → 120 °C leaves α = 1e-3, heating 120 → 180 °C gives 1.
+    /// Erratum 2: `DTEMP > 0` crystallizes. Cooling 200 → 120 °C leaves α = 1e-3, heating 120 → 180 °C gives
+    /// 1.
     #[test]
     fn erratum_2_the_sign_is_inverted() {
         let cooled = ramp(Sign::AsPublished, false, 200.0, 120.0, 0.005, 0.03);
@@ -328,7 +331,8 @@ mod printed {
         assert_eq!(alpha, f64::from(1e-3_f32));
     }
 
-    /// Euler at 1 K steps and 10 K/min: NaN, as formulation.md's table has it, with the sign corrected and guarded.
+    /// Euler at 1 K steps and 10 K/min: NaN, as formulation.md's table has it, with the sign corrected and
+    /// guarded.
     #[test]
     fn euler_goes_nan_at_one_kelvin_per_step() {
         let alphas = ramp(Sign::Mended, true, 200.0, 120.0, 1.0, 6.0);

@@ -14,8 +14,8 @@ const TOLERANCE: f64 = 1e-12;
 
 /// Elements, their state and displacements.
 ///
-/// Strains of an element count from its birth: only increments of displacement enter, so that where shared nodes were
-/// before does not matter.
+/// Strains of an element count from its birth: only increments of displacement enter, so that where shared
+/// nodes were before does not matter.
 pub struct Body<'a> {
     pub(super) mesh: &'a Mesh,
     /// Elements of one shape share their matrices.
@@ -30,7 +30,8 @@ pub struct Body<'a> {
 /// State of a body, to continue bit by bit.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct BodyState {
-    /// Elastic strains of the branches at each Gauss point (0 beyond those of the element), element by element; empty before birth.
+    /// Elastic strains of the branches at each Gauss point (0 beyond those of the element), element by
+    /// element; empty before birth.
     strains: Vec<Vec<[[f64; 6]; POINTS]>>,
     /// Σ E b s e at the Gauss points of each element at the end of the last step, Pa: the stress over Ĉ.
     stresses: Vec<[[f64; 6]; POINTS]>,
@@ -62,8 +63,8 @@ impl<'a> Body<'a> {
     /// A body without any element born.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for other elements than hexahedra of first order and tetrahedra, for elements that are turned inside out, and for a
-    /// Poisson's ratio outside −1 … 0.5.
+    /// [`Error::Parameter`] for other elements than hexahedra of first order and tetrahedra, for elements
+    /// that are turned inside out, and for a Poisson's ratio outside −1 … 0.5.
     pub fn new(mesh: &'a Mesh, poisson: f64) -> Result<Self, Error> {
         let fault =
             |name, found: f64, allowed: &str| Error::Parameter { name, found, allowed: allowed.to_owned() };
@@ -119,7 +120,8 @@ impl<'a> Body<'a> {
         &self.shapes[self.shape[element] as usize]
     }
 
-    /// Largest rotation of an element since it was melt, rad. Strains are small: a rotation θ looks like a strain ½θ².
+    /// Largest rotation of an element since it was melt, rad. Strains are small: a rotation θ looks like a
+    /// strain ½θ².
     pub fn largest_rotation(&self) -> f64 {
         self.state.rotations.iter().map(|r| r[0].hypot(r[1]).hypot(r[2])).fold(0.0, f64::max)
     }
@@ -147,11 +149,13 @@ impl<'a> Body<'a> {
         self.mesh.nodes(element as u32)
     }
 
-    /// One step of all elements that are born: `increment` of an element, and its linear free strain at a Gauss point and its place (at the Gauss points: taken at the
-    /// centre alone, it would leave stresses in a body that bends freely). One linear solution.
+    /// One step of all elements that are born: `increment` of an element, and its linear free strain at a
+    /// Gauss point and its place (at the Gauss points: taken at the centre alone, it would leave stresses in
+    /// a body that bends freely). One linear solution.
     ///
     /// # Errors
-    /// [`Error::Parameter`] where conjugate gradients do not converge: the supports leave a rigid motion that the loads drive.
+    /// [`Error::Parameter`] where conjugate gradients do not converge: the supports leave a rigid motion that
+    /// the loads drive.
     pub fn step(
         &mut self,
         increment: impl Fn(usize) -> Increment,

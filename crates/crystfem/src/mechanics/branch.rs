@@ -1,6 +1,7 @@
 //! One branch of a solidifying Maxwell body over a step, in closed form, with its energies.
 
-/// State of what carries a branch over a step: s is the share of the network that exists (1 for the amorphous phase), b softens it.
+/// State of what carries a branch over a step: s is the share of the network that exists (1 for the amorphous
+/// phase), b softens it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Change {
     /// Reduced time over relaxation time, y = Δξ/τ ≥ 0; 0 is elastic.
@@ -18,14 +19,15 @@ pub struct Step {
     pub carried: f64,
     /// See [`Self::carried`].
     pub gained: f64,
-    /// b₂ s₂ or its mean over a growing network: the stiffness of the step is this times h = (1 − e^{−y})/y, and the stress at the end
-    /// b₂ s₂ e₂.
+    /// b₂ s₂ or its mean over a growing network: the stiffness of the step is this times h = (1 − e^{−y})/y,
+    /// and the stress at the end b₂ s₂ e₂.
     pub stiffness: f64,
     change: Change,
     forms: Forms,
 }
 
-/// Energies of a step over the modulus, with e:Ĉ:e for squares: what was put in, what is left, and where the rest went.
+/// Energies of a step over the modulus, with e:Ĉ:e for squares: what was put in, what is left, and where the
+/// rest went.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Energies {
     /// Work of the stress of this branch on Δε.
@@ -83,7 +85,8 @@ impl Forms {
         let p = -(-y).exp_m1();
         let h = if y > 0.0 { p / y } else { 1.0 };
         let (a, b) = (-0.5 * (-2.0 * y).exp_m1(), 0.5 * p * h);
-        // closed forms cancel at small y: g = (1 − h)/y = Σ (−y)^k/(k + 2)!, C = Σ (−1)^{m+1} (2^{m−1} − 2) y^{m−2}/m!
+        // closed forms cancel at small y: g = (1 − h)/y = Σ (−y)^k/(k + 2)!, C = Σ (−1)^{m+1} (2^{m−1} − 2)
+        // y^{m−2}/m!
         let (g, c) = if y < 0.5 {
             let (mut g, mut c, mut power, mut factorial) = (0.0, 0.0, 1.0, 2.0);
             for m in 2..22_i32 {
@@ -102,8 +105,9 @@ impl Forms {
 }
 
 impl Step {
-    /// Growth e ← (s₁ e^{−y} e + s̄ h Δε)/s₂, melting e ← e^{−y} e + h Δε, s̄ = ½(s₁ + s₂): new crystals are born without stress (Bažant's
-    /// solidification), those that melt take theirs along. Linear in Δε, unconditionally stable.
+    /// Growth e ← (s₁ e^{−y} e + s̄ h Δε)/s₂, melting e ← e^{−y} e + h Δε, s̄ = ½(s₁ + s₂): new crystals are
+    /// born without stress (Bažant's solidification), those that melt take theirs along. Linear in Δε,
+    /// unconditionally stable.
     pub fn new(change: Change) -> Self {
         let Change { relaxation, share: [before, after], softening } = change;
         let forms = Forms::new(relaxation);
@@ -119,8 +123,8 @@ impl Step {
         Self { carried, gained, stiffness: softening[1] * share * forms.h, change, forms }
     }
 
-    /// Energies from e:Ĉ:e, e:Ĉ:Δε and Δε:Ĉ:Δε of the elastic strain e at the beginning: growth or melting to s̄, relaxation there, and the
-    /// rest of growth or melting (Strang's order).
+    /// Energies from e:Ĉ:e, e:Ĉ:Δε and Δε:Ĉ:Δε of the elastic strain e at the beginning: growth or melting to
+    /// s̄, relaxation there, and the rest of growth or melting (Strang's order).
     pub fn energies(&self, ee: f64, ed: f64, dd: f64) -> Energies {
         let Change { share: [before, after], softening: [soft, hard], .. } = self.change;
         let (mean, growing) = (0.5 * (before + after), after >= before);
@@ -164,7 +168,8 @@ mod tests {
         Step::new(Change { relaxation, share, softening: [1.0; 2] })
     }
 
-    /// `docs/reference/print/branch.py`: 20,000 random steps, each of which closes its energies; no loss is negative.
+    /// `docs/reference/print/branch.py`: 20,000 random steps, each of which closes its energies; no loss is
+    /// negative.
     #[test]
     fn energies_close_over_any_history() {
         let mut random = SplitMix64::new(1);
@@ -204,7 +209,8 @@ mod tests {
         assert!((below.g - above.g).abs() < 1e-11 && (below.loss[2] - above.loss[2]).abs() < 1e-11);
     }
 
-    /// Crystals that melt take their stress along, new ones carry none: 1 GPa at a strain of 1e-3, s 1 → ½ → 1 and 1 → 0 → 1.
+    /// Crystals that melt take their stress along, new ones carry none: 1 GPa at a strain of 1e-3, s 1 → ½ →
+    /// 1 and 1 → 0 → 1.
     #[test]
     fn cycles_of_melting() {
         let after = |shares: &[f64]| {

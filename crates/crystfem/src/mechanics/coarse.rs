@@ -1,7 +1,7 @@
 //! A coarse level of rigid motions: six for each group of about 4³ nodes.
 //!
-//! Conjugate gradients with 3 × 3 blocks alone need as many iterations as a part is slender; blocks plus P (Pᵀ K P)⁻¹ Pᵀ need about
-//! 45 whatever its shape (`docs/guide/src/theory/print-stress.md`).
+//! Conjugate gradients with 3 × 3 blocks alone need as many iterations as a part is slender; blocks plus P
+//! (Pᵀ K P)⁻¹ Pᵀ need about 45 whatever its shape (`docs/guide/src/theory/print-stress.md`).
 
 use super::product::{Elements, block};
 use nalgebra::{Matrix3x6, SMatrix, Vector3, Vector6};
@@ -31,7 +31,8 @@ impl Coarse {
         for (nodes, ..) in elements.each() {
             nodes.iter().for_each(|&node| exists[node as usize] = true);
             let at = |k: usize| Vector3::from(points[nodes[k] as usize]);
-            // of an upright brick: its edges; of a tetrahedron the box around its corners, half of it with nodes on edges
+            // of an upright brick: its edges; of a tetrahedron the box around its corners, half of it with
+            // nodes on edges
             edges += if nodes.len() == 8 {
                 (at(6) - at(0)).abs()
             } else {
@@ -119,7 +120,8 @@ impl Coarse {
     }
 }
 
-/// The lower triangle of a symmetric matrix of 6 × 6 blocks, row by row from the first entry that may not be 0.
+/// The lower triangle of a symmetric matrix of 6 × 6 blocks, row by row from the first entry that may not be
+/// 0.
 struct Skyline {
     /// Where each row begins in `values`, and its first column.
     starts: Vec<usize>,

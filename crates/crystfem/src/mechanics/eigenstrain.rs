@@ -1,10 +1,12 @@
 //! Free strain of a crystallizing polymer as a function of its state.
 
-/// Specific volume v = (1 − X) v_a + X v_c, X = X∞ α, of an amorphous phase with a glass transition and of crystals:
+/// Specific volume v = (1 − X) v_a + X v_c, X = X∞ α, of an amorphous phase with a glass transition and of
+/// crystals:
 ///
 /// ln v_a = −ln ρ_a + γ_g (min(T, T_g) − T_r) + γ_l max(T − T_g, 0), ln v_c = −ln ρ_c + γ_c (T − T_r).
 ///
-/// Thermal expansion and the shrinkage of crystallization are one function of the state: nothing drifts over cycles.
+/// Thermal expansion and the shrinkage of crystallization are one function of the state: nothing drifts over
+/// cycles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpecificVolume {
     /// Densities ρ_a and ρ_c at T_r, kg/m³.
@@ -13,14 +15,16 @@ pub struct SpecificVolume {
     pub glass_transition: f64,
     /// T_r, K.
     pub reference: f64,
-    /// Volumetric expansion γ_g and γ_l of the amorphous phase below and above T_g, and γ_c of the crystals, 1/K.
+    /// Volumetric expansion γ_g and γ_l of the amorphous phase below and above T_g, and γ_c of the crystals,
+    /// 1/K.
     pub expansions: [f64; 3],
     /// Mass fraction X∞ of crystals at α = 1.
     pub crystallinity: f64,
 }
 
 impl SpecificVolume {
-    /// Of PA12: ρ_c of the γ cell (Inoue and Hoshino 1973 gives 1034 kg/m³), ρ_a = 990 kg/m³ from the literature, expansions assumed.
+    /// Of PA12: ρ_c of the γ cell (Inoue and Hoshino 1973 gives 1034 kg/m³), ρ_a = 990 kg/m³ from the
+    /// literature, expansions assumed.
     pub const PA12: Self = Self {
         densities: [990.0, 1034.0],
         glass_transition: 324.0,
@@ -52,7 +56,8 @@ mod tests {
     use super::*;
     use evidence::near;
 
-    /// `docs/reference/print/pa12.py`: expansion coefficients, crystallization at 160 °C, melt to room temperature.
+    /// `docs/reference/print/pa12.py`: expansion coefficients, crystallization at 160 °C, melt to room
+    /// temperature.
     #[test]
     fn pa12_shrinks_as_it_should() {
         let volume = SpecificVolume::PA12;

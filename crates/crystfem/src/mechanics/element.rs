@@ -37,8 +37,9 @@ pub fn strain_of(gradient: [f64; 3]) -> SMatrix<f64, 6, 3> {
     SMatrix::from_row_slice(&[x, 0.0, 0.0, 0.0, y, 0.0, 0.0, 0.0, z, y, x, 0.0, 0.0, z, y, z, 0.0, x])
 }
 
-/// An eight-node hexahedron with the modes 1 − ξ², 1 − η², 1 − ζ² in each displacement (Wilson and Taylor 1973), whose gradients are taken with
-/// the Jacobian of the centre (Taylor, Beresford and Wilson 1976, doi:10.1002/nme.1620100602), so that the patch test holds. The modes are condensed.
+/// An eight-node hexahedron with the modes 1 − ξ², 1 − η², 1 − ζ² in each displacement (Wilson and Taylor
+/// 1973), whose gradients are taken with the Jacobian of the centre (Taylor, Beresford and Wilson 1976,
+/// doi:10.1002/nme.1620100602), so that the patch test holds. The modes are condensed.
 #[derive(Clone, Debug)]
 pub struct Hexahedron {
     /// Volumes of the Gauss points, m³.
@@ -115,7 +116,8 @@ impl Hexahedron {
         self.elastic * strain
     }
 
-    /// Nodal forces of stresses at the Gauss points, with the modes condensed, and the forces of the modes: [`Self::strains`] takes them.
+    /// Nodal forces of stresses at the Gauss points, with the modes condensed, and the forces of the modes:
+    /// [`Self::strains`] takes them.
     pub fn forces(&self, stresses: &[Six; POINTS]) -> (Nodal, SVector<f64, 9>) {
         let (mut nodal, mut modal) = (Nodal::zeros(), SVector::<f64, 9>::zeros());
         for point in 0..POINTS {
@@ -126,8 +128,8 @@ impl Hexahedron {
         (nodal - self.coupling * (self.inverse * modal), modal)
     }
 
-    /// Strain increments at the Gauss points of nodal displacements, where the modes balance the forces `modal` of the stresses at the start of the
-    /// step over a stiffness `modulus` Ĉ.
+    /// Strain increments at the Gauss points of nodal displacements, where the modes balance the forces
+    /// `modal` of the stresses at the start of the step over a stiffness `modulus` Ĉ.
     pub fn strains(&self, displacement: &Nodal, modal: &SVector<f64, 9>, modulus: f64) -> [Six; POINTS] {
         let modes = -(self.inverse * (modal / modulus + self.coupling.transpose() * displacement));
         std::array::from_fn(|point| self.nodes[point] * displacement + self.modes[point] * modes)

@@ -20,7 +20,8 @@ pub struct Branch {
 pub enum Shift {
     /// 0 at all temperatures.
     None,
-    /// −ln 10 · c₁(T − T_r)/(c₂ + T − T_r) above T_r (Williams, Landel and Ferry 1955), its slope there below, at most a = 1e12.
+    /// −ln 10 · c₁(T − T_r)/(c₂ + T − T_r) above T_r (Williams, Landel and Ferry 1955), its slope there
+    /// below, at most a = 1e12.
     Wlf {
         /// T_r, K.
         reference: f64,
@@ -64,8 +65,9 @@ impl Shift {
     }
 }
 
-/// σ = Ĉ(ν):[Σ_A E_i e_i + b(T) s(α) Σ_N E_i e_i], with the elastic strain e_i of each branch, the stiffness Ĉ of modulus 1, one Poisson ratio and
-/// s = α. New crystals are born without stress and melting ones take theirs along: no stress-free temperature is needed.
+/// σ = Ĉ(ν):[Σ_A E_i e_i + b(T) s(α) Σ_N E_i e_i], with the elastic strain e_i of each branch, the stiffness
+/// Ĉ of modulus 1, one Poisson ratio and s = α. New crystals are born without stress and melting ones take
+/// theirs along: no stress-free temperature is needed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SolidifyingMaxwell {
     /// Free strain.
@@ -89,7 +91,8 @@ pub struct SolidifyingMaxwell {
 pub struct Increment {
     /// Linear free strain Δε*.
     pub free_strain: f64,
-    /// Stiffness of the step over Ĉ, Pa: Δσ = stiffness Ĉ:(Δε − Δε* 1) beside what relaxes, the floor included.
+    /// Stiffness of the step over Ĉ, Pa: Δσ = stiffness Ĉ:(Δε − Δε* 1) beside what relaxes, the floor
+    /// included.
     pub stiffness: f64,
     /// The part of the floor in it, whose stress is not kept, Pa.
     pub floor: f64,
@@ -100,8 +103,8 @@ pub struct Increment {
 }
 
 impl SolidifyingMaxwell {
-    /// PA12: moduli whose sum at 23 °C is that of sheets of PA 2200 (EOS), their split and times assumed; T_g of chapter 4. Placeholders until
-    /// someone measures them.
+    /// PA12: moduli whose sum at 23 °C is that of sheets of PA 2200 (EOS), their split and times assumed; T_g
+    /// of chapter 4. Placeholders until someone measures them.
     pub fn pa12() -> Self {
         let third = |time: f64| Branch { modulus: 300e6, time };
         let network = [(420e6, f64::INFINITY), (140e6, 10.0), (140e6, 1000.0)];
@@ -122,7 +125,8 @@ impl SolidifyingMaxwell {
         }
     }
 
-    /// An elastic body of modulus E, Pa, ν, linear thermal expansion, 1/K, and strength, Pa: one branch that does not relax.
+    /// An elastic body of modulus E, Pa, ν, linear thermal expansion, 1/K, and strength, Pa: one branch that
+    /// does not relax.
     pub fn elastic(modulus: f64, poisson: f64, expansion: f64, strength: f64) -> Self {
         // two phases of one density and expansion: ln v is linear in T
         let volume = SpecificVolume {
@@ -143,7 +147,8 @@ impl SolidifyingMaxwell {
         }
     }
 
-    /// With another crystallinity X∞ at α = 1: its share in the volume, and a network in proportion to it; without crystals there is none.
+    /// With another crystallinity X∞ at α = 1: its share in the volume, and a network in proportion to it;
+    /// without crystals there is none.
     pub fn with_crystallinity(mut self, crystallinity: f64) -> Self {
         let factor = crystallinity / self.volume.crystallinity;
         self.network.0.iter_mut().for_each(|branch| branch.modulus *= factor);
@@ -184,7 +189,8 @@ impl SolidifyingMaxwell {
         Increment { free_strain, stiffness: stiffness + floor, floor, melt, branches }
     }
 
-    /// The stress over Ĉ after a hold: Σ E_i e_i, Pa, for a strain measure such as one component under a uniaxial stress.
+    /// The stress over Ĉ after a hold: Σ E_i e_i, Pa, for a strain measure such as one component under a
+    /// uniaxial stress.
     pub fn relaxation_modulus(&self, temperature: f64, degree: f64, time: f64) -> f64 {
         let sum = |(list, shift): &(Vec<Branch>, Shift)| -> f64 {
             let reduced = shift.reduced_time([temperature; 2], time);
@@ -195,7 +201,8 @@ impl SolidifyingMaxwell {
 }
 
 impl Increment {
-    /// Elastic strains at the end, in place, of any components, for Δε of the same: mechanical is Δε − Δε* where a component has a free strain.
+    /// Elastic strains at the end, in place, of any components, for Δε of the same: mechanical is Δε − Δε*
+    /// where a component has a free strain.
     pub fn advance<const N: usize>(&self, strains: &mut [[f64; N]], mechanical: &[f64; N]) {
         for ((step, _, _), strain) in self.branches.iter().zip(strains) {
             for (e, d) in strain.iter_mut().zip(mechanical) {
@@ -240,7 +247,8 @@ mod tests {
     use crate::kinetics::{Constants, Kinetics};
     use evidence::near;
 
-    /// α 1e-4/K, E∞ 0.4 and E₁ 0.6 GPa, τ 30 s, −1 K/s for 100 s, held. Without crystals the amorphous phase of one density is linear in T.
+    /// α 1e-4/K, E∞ 0.4 and E₁ 0.6 GPa, τ 30 s, −1 K/s for 100 s, held. Without crystals the amorphous phase
+    /// of one density is linear in T.
     fn held_bar(shift: Shift) -> SolidifyingMaxwell {
         let branch = |modulus, time| Branch { modulus, time };
         let volume = SpecificVolume {
@@ -295,7 +303,8 @@ mod tests {
         }
     }
 
-    /// A cube at 160 °C, α 0 → 1, held one way, network of 1 GPa: E(1 − ln(1 + c)/c)/3, c = X∞(v_c − v_a)/v_a.
+    /// A cube at 160 °C, α 0 → 1, held one way, network of 1 GPa: E(1 − ln(1 + c)/c)/3, c = X∞(v_c −
+    /// v_a)/v_a.
     #[test]
     fn a_held_cube_crystallizes() {
         let body = SolidifyingMaxwell {
@@ -329,8 +338,8 @@ mod tests {
         near("print_modulus_at_rest", body.relaxation_modulus(296.15, 1.0, 0.0), 1600e6, 1.0);
     }
 
-    /// Temperatures of the plate at times: at two points of Gauss in each of 24 cells, then in its centre and on its
-    /// surface.
+    /// Temperatures of the plate at times: at two points of Gauss in each of 24 cells, then in its centre and
+    /// on its surface.
     fn cooled(times: impl Iterator<Item = f64>) -> Vec<(f64, Vec<f64>)> {
         let (wall, diffusivity, cells) = (Wall { biot: 1.0 }, 0.25 / 1010.0 / 2200.0, 24);
         let offset = 0.5 / 3.0_f64.sqrt();
@@ -342,8 +351,9 @@ mod tests {
         times.map(|time| (time, places.iter().map(|&place| at(time, place)).collect())).collect()
     }
 
-    /// Stress in the plane of a plate of 4 mm of PA12, 220 °C to 25 °C, Bi = 1 on both faces, without latent heat, after 600 s: centre and
-    /// surface, free or held at its edges. σ = Σ E e/(1 − ν) with one elastic strain in the plane for each branch.
+    /// Stress in the plane of a plate of 4 mm of PA12, 220 °C to 25 °C, Bi = 1 on both faces, without latent
+    /// heat, after 600 s: centre and surface, free or held at its edges. σ = Σ E e/(1 − ν) with one elastic
+    /// strain in the plane for each branch.
     fn plate(body: &SolidifyingMaxwell, held: bool, history: &[(f64, Vec<f64>)]) -> [f64; 2] {
         let kinetics = Kinetics::new(Constants::TABLE_4_1_COLUMN_1).unwrap();
         let count = history[0].1.len();

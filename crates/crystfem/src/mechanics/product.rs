@@ -1,5 +1,5 @@
-//! Products of element matrices with displacements: each element by vectors of the processor, then the sum at each node in the order of its
-//! elements, so that its bits do not depend on threads.
+//! Products of element matrices with displacements: each element by vectors of the processor, then the sum at
+//! each node in the order of its elements, so that its bits do not depend on threads.
 
 use super::element::Wide;
 use crate::system::vector::sum;
@@ -181,7 +181,8 @@ mod tests {
     use super::*;
     use nalgebra::{DMatrix, DVector};
 
-    /// Two hexahedra that share four nodes and tetrahedra on them, one component held, against plain matrices.
+    /// Two hexahedra that share four nodes and tetrahedra on them, one component held, against plain
+    /// matrices.
     #[test]
     fn a_product_is_that_of_the_matrices() {
         let matrix =

@@ -17,8 +17,8 @@ const ITERATIONS: usize = 20;
 const ROUNDING: f64 = 1e-14;
 
 impl Body<'_> {
-    /// Conjugate gradients with the inverse 3 × 3 blocks of the nodes and a coarse level of rigid motions, on the nodes that exist; adds
-    /// its iterations to the state.
+    /// Conjugate gradients with the inverse 3 × 3 blocks of the nodes and a coarse level of rigid motions, on
+    /// the nodes that exist; adds its iterations to the state.
     ///
     /// # Errors
     /// [`Error::Parameter`] where they do not converge.

@@ -64,7 +64,8 @@ fn curvature(mesh: &Mesh, body: &Body) -> f64 {
     2.0 * matrix.svd(true, true).solve(&right, 1e-14).unwrap()[2] / (length * length)
 }
 
-/// A block with one distorted element inside under displacements of a linear field: strains of every Gauss point are exact.
+/// A block with one distorted element inside under displacements of a linear field: strains of every Gauss
+/// point are exact.
 #[test]
 fn the_patch_test_holds() {
     let mut mesh = block([3, 3, 3], [3.0, 3.0, 3.0]);
@@ -97,8 +98,8 @@ fn a_free_cube_has_no_stress() {
     at_most("stress_free_cube", most / 1e7, 1e-10);
 }
 
-/// Timoshenko's bimetal, 1 mm of 3 GPa and 2 mm of 1.5 GPa, free strains of −1 and −2 %: κ = 4.864864865 /m; the element of
-/// `docs/reference/print/fem.py` gives 4.8644041.
+/// Timoshenko's bimetal, 1 mm of 3 GPa and 2 mm of 1.5 GPa, free strains of −1 and −2 %: κ = 4.864864865 /m;
+/// the element of `docs/reference/print/fem.py` gives 4.8644041.
 #[test]
 fn a_bimetal_bends() {
     let mesh = block([16, 1, 3], [0.04, 2e-3, 3e-3]);
@@ -131,7 +132,8 @@ fn layers_in_sequence_bend() {
     }
 }
 
-/// The same on a substrate of 2 mm, 2 mm in all: κ = Σ 6εh(t + (i − 1)h)/(t + ih)³, towards 15 /m of infinitely many.
+/// The same on a substrate of 2 mm, 2 mm in all: κ = Σ 6εh(t + (i − 1)h)/(t + ih)³, towards 15 /m of
+/// infinitely many.
 #[test]
 fn layers_bend_their_substrate() {
     for (layers, exact) in [(1, 3.75), (2, 7.256_944_444), (8, 12.447_044_67)] {
@@ -177,7 +179,8 @@ fn a_part_is_released_from_its_bed() {
     near("stress_released", curvature(&mesh, &body).abs() / 0.501_560_187, 1.0, 1e-5);
 }
 
-/// The same release: its work is ½R·Δu of the reactions, what it stores balances that, and rotations are those of a circle.
+/// The same release: its work is ½R·Δu of the reactions, what it stores balances that, and rotations are
+/// those of a circle.
 #[test]
 fn a_release_does_the_work_of_its_reactions() {
     let mesh = block([32, 1, 4], [0.064, 2e-3, 4e-3]);
@@ -212,7 +215,8 @@ fn a_release_does_the_work_of_its_reactions() {
     near("stress_release_rotation", turned / (curvature(&mesh, &body).abs() * 0.031), 1.0, 2e-3);
 }
 
-/// Work of the solver: `/work/shared/reference/print/pcg.csv` and `pcg_slender.csv`, to 1e-6 of the load, with a molten top layer.
+/// Work of the solver: `/work/shared/reference/print/pcg.csv` and `pcg_slender.csv`, to 1e-6 of the load,
+/// with a molten top layer.
 #[test]
 fn iterations_do_not_follow_the_shape() {
     for (count, floor, published) in [

@@ -9,8 +9,9 @@ use nalgebra::{Matrix3, SMatrix, Vector3};
 const NEAR: f64 = 0.585_410_196_624_968_5;
 const FAR: f64 = 0.138_196_601_125_010_5;
 
-/// A tetrahedron of 4 nodes with one Gauss point, or of 10 with four. Free strains at four points are a linear function, which the
-/// strains of second order contain; the constant strain of first order takes the mean.
+/// A tetrahedron of 4 nodes with one Gauss point, or of 10 with four. Free strains at four points are a
+/// linear function, which the strains of second order contain; the constant strain of first order takes the
+/// mean.
 #[derive(Clone, Debug)]
 pub struct Tetrahedron {
     nodes: usize,

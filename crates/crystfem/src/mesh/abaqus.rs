@@ -23,16 +23,16 @@ pub use write::write;
 /// Reads a mesh, coordinates multiplied by `scale` (1e-3 for a file in mm).
 ///
 /// Understood, in any case of letters: `*NODE` (`NSET`), `*ELEMENT` (`TYPE`, `ELSET`), `*NSET` and `*ELSET`
-/// (`GENERATE`, names of other sets, `*NSET, ELSET=`), `*SURFACE` (of elements, with or without `Sn`, or of nodes), one
-/// `*PART` with one `*INSTANCE` (moved and turned), `*INCLUDE`, continuation lines, comments. Triangles and quadrangles of shells and membranes
-/// name surfaces, lines nothing. Other keywords are passed over: the notes name them, with
-/// the key of a scene that means the same. A name keeps the letters of its
+/// (`GENERATE`, names of other sets, `*NSET, ELSET=`), `*SURFACE` (of elements, with or without `Sn`, or of
+/// nodes), one `*PART` with one `*INSTANCE` (moved and turned), `*INCLUDE`, continuation lines, comments.
+/// Triangles and quadrangles of shells and membranes name surfaces, lines nothing. Other keywords are passed
+/// over: the notes name them, with the key of a scene that means the same. A name keeps the letters of its
 /// first use.
 ///
 /// # Errors
-/// [`Error::Shared`] where the file cannot be read; [`Error::File`] with the line: other elements, numbers that do not
-/// fit, sets and nodes that do not exist, and what would change the mesh unseen (`*NGEN`, `*SYSTEM`, …);
-/// [`Error::Mesh`] from [`crate::mesh::quality::check`]. Memory follows the size of the file.
+/// [`Error::Shared`] where the file cannot be read; [`Error::File`] with the line: other elements, numbers
+/// that do not fit, sets and nodes that do not exist, and what would change the mesh unseen (`*NGEN`,
+/// `*SYSTEM`, …); [`Error::Mesh`] from [`crate::mesh::quality::check`]. Memory follows the size of the file.
 pub fn read(path: &Path, scale: f64) -> Result<ReadMesh, Error> {
     let bytes = crate::file::read_bytes(path)?;
     parse(path, &bytes, scale)
@@ -117,8 +117,8 @@ const STEMS: [(Kind, &[&str]); 13] = [
     (Kind::Point, &["MASS", "HEATCAP"]),
 ];
 
-/// Kind of an element by its name in upper case: letters after a stem (R, I, H, T, …) tell of integration and physics, not
-/// of nodes.
+/// Kind of an element by its name in upper case: letters after a stem (R, I, H, T, …) tell of integration and
+/// physics, not of nodes.
 fn kind_of(name: &str) -> Option<Kind> {
     let is = |stem: &&str| {
         name.strip_prefix(stem).is_some_and(|rest| rest.bytes().all(|byte| byte.is_ascii_alphabetic()))

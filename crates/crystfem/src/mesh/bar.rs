@@ -41,13 +41,13 @@ impl Bar {
         Self { size, layers, layer_height, elements_per_layer, element_size, substrate: None, cells }
     }
 
-    /// Conforming elements: element sets `bar`, `layer-1` … `layer-N`, `substrate`; surfaces and node sets on the sides
-    /// of the box around all, [`crate::mesh::BOX_SIDES`] (`bottom` is the substrate's lower face), and `interface`,
-    /// the bar's lower face.
+    /// Conforming elements: element sets `bar`, `layer-1` … `layer-N`, `substrate`; surfaces and node sets on
+    /// the sides of the box around all, [`crate::mesh::BOX_SIDES`] (`bottom` is the substrate's lower face),
+    /// and `interface`, the bar's lower face.
     ///
     /// # Errors
-    /// Sizes or counts that are not positive, a layer without thickness or elements, a substrate smaller than the bar,
-    /// more nodes than 2²⁸.
+    /// Sizes or counts that are not positive, a layer without thickness or elements, a substrate smaller than
+    /// the bar, more nodes than 2²⁸.
     pub fn mesh(&self) -> Result<Mesh, Error> {
         let grid = self.grid()?;
         let [x, y] = self.size.map(|size| 0.5 * size);
@@ -74,7 +74,8 @@ impl Bar {
         Ok(mesh)
     }
 
-    /// Elements along each axis of the grid through bar and substrate, as real numbers: they may be too many to make.
+    /// Elements along each axis of the grid through bar and substrate, as real numbers: they may be too many
+    /// to make.
     ///
     /// # Errors
     /// As [`Bar::mesh`].

@@ -11,8 +11,8 @@ use crate::mesh::{Cell, Face, Mesh, Shape};
 /// A mesh as read from a file, checked.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReadMesh {
-    /// The mesh; nodes and elements in the order of the file, 8-node hexahedra before 4-node tetrahedra before others,
-    /// nodes of no element left out.
+    /// The mesh; nodes and elements in the order of the file, 8-node hexahedra before 4-node tetrahedra
+    /// before others, nodes of no element left out.
     pub mesh: Mesh,
     /// The file's number of each node.
     pub node_labels: Vec<u64>,
@@ -92,7 +92,8 @@ pub(super) struct Content {
     /// Numbers of the nodes of all elements, in the order of [`Shape`] of each.
     pub element_nodes: Vec<u64>,
     pub node_sets: BTreeMap<String, Vec<u32>>,
-    /// Hexahedra, tetrahedra and wedges become an element set, triangles and quadrangles a surface of the same name.
+    /// Hexahedra, tetrahedra and wedges become an element set, triangles and quadrangles a surface of the
+    /// same name.
     pub element_sets: BTreeMap<String, Vec<u32>>,
     pub surfaces: BTreeMap<String, Vec<Face>>,
     pub notes: Vec<String>,

@@ -27,9 +27,9 @@ impl Mesh {
         Geometry::new(&places[..nodes])
     }
 
-    /// Positive share of an element's volume for each of its nodes, for means over nodes, m³: ∫ N dV; of second-order
-    /// elements, where that is negative at corners, V ∫ N² dV over the sum of all (Hinton, Rock & Zienkiewicz 1976). `None`
-    /// where a Jacobian is not positive.
+    /// Positive share of an element's volume for each of its nodes, for means over nodes, m³: ∫ N dV; of
+    /// second-order elements, where that is negative at corners, V ∫ N² dV over the sum of all (Hinton, Rock
+    /// & Zienkiewicz 1976). `None` where a Jacobian is not positive.
     pub(crate) fn node_volumes(&self, element: u32) -> Option<[f64; WIDE]> {
         let mut volumes = [0.0; WIDE];
         let (places, nodes) = self.positions::<WIDE>(element);

@@ -1,8 +1,8 @@
 //! Reads Gmsh's MSH 2 and 4, ASCII and binary of either byte order
 //! (<https://gmsh.info/doc/texinfo/gmsh.html#MSH-file-format>).
 //!
-//! A reader of our own: `mshio` 0.4 does not read physical names and panics (`unimplemented!`, `expect`) on sizes and
-//! digits that it does not know.
+//! A reader of our own: `mshio` 0.4 does not read physical names and panics (`unimplemented!`, `expect`) on
+//! sizes and digits that it does not know.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -16,15 +16,17 @@ mod two;
 
 use numbers::{Numbers, Version};
 
-/// Reads a mesh, coordinates multiplied by `scale` (1e-3 for a file in mm). Physical groups of volumes become element
-/// sets, those of surfaces become surfaces and node sets, those of curves and points node sets; a group without a name
-/// is called `physical-TAG`. Hexahedra (8 or 20 nodes), tetrahedra (4 or 10) and prisms (6 or 15) are computed on; of 27 and 18
-/// nodes those in the middles of sides and of the element are left out.
+/// Reads a mesh, coordinates multiplied by `scale` (1e-3 for a file in mm). Physical groups of volumes become
+/// element sets, those of surfaces become surfaces and node sets, those of curves and points node sets; a
+/// group without a name is called `physical-TAG`. Hexahedra (8 or 20 nodes), tetrahedra (4 or 10) and prisms
+/// (6 or 15) are computed on; of 27 and 18 nodes those in the middles of sides and of the element are left
+/// out.
 ///
 /// # Errors
-/// [`Error::Shared`] where the file cannot be read; [`Error::File`] with the line (in binary files the section's line
-/// and the byte) for what is not MSH 2 or 4, other elements, and numbers that do not fit; [`Error::Mesh`] from
-/// [`crate::mesh::quality::check`]. Memory follows the size of the file, not the counts that it announces.
+/// [`Error::Shared`] where the file cannot be read; [`Error::File`] with the line (in binary files the
+/// section's line and the byte) for what is not MSH 2 or 4, other elements, and numbers that do not fit;
+/// [`Error::Mesh`] from [`crate::mesh::quality::check`]. Memory follows the size of the file, not the counts
+/// that it announces.
 pub fn read(path: &Path, scale: f64) -> Result<ReadMesh, Error> {
     let bytes = crate::file::read_bytes(path)?;
     parse(path, &bytes, scale)

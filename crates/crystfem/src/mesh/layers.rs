@@ -62,11 +62,12 @@ impl Layers {
         Ok(Self { elements, notes: Vec::new() })
     }
 
-    /// Layers by height: an element belongs to the layer in which its centre lies. `faces` are the z of the lower face of
-    /// the first layer and of the upper face of each, m; `elements` those that are printed.
+    /// Layers by height: an element belongs to the layer in which its centre lies. `faces` are the z of the
+    /// lower face of the first layer and of the upper face of each, m; `elements` those that are printed.
     ///
     /// # Errors
-    /// Faces that do not ascend (a layer without thickness), a layer without an element, an element outside of all.
+    /// Faces that do not ascend (a layer without thickness), a layer without an element, an element outside
+    /// of all.
     pub fn from_heights(mesh: &Mesh, elements: &[u32], faces: &[f64]) -> Result<Self, Error> {
         let named =
             |layer: usize| format!("layer {layer}, z from {} m to {} m", faces[layer - 1], faces[layer]);
@@ -122,11 +123,12 @@ impl Layers {
         Ok(Self { elements: layers, notes })
     }
 
-    /// [`Self::from_heights`] with layers of one height, from the lowest node of the elements to the highest; the last
-    /// layer ends there.
+    /// [`Self::from_heights`] with layers of one height, from the lowest node of the elements to the highest;
+    /// the last layer ends there.
     ///
     /// # Errors
-    /// A height that is not positive or that makes more layers than elements, and what [`Self::from_heights`] refuses.
+    /// A height that is not positive or that makes more layers than elements, and what [`Self::from_heights`]
+    /// refuses.
     pub fn from_height(mesh: &Mesh, elements: &[u32], height: f64) -> Result<Self, Error> {
         let nodes = elements.iter().flat_map(|element| mesh.nodes(*element));
         let heights = nodes.map(|node| mesh.points[*node as usize][2]);
@@ -143,9 +145,9 @@ impl Layers {
     }
 }
 
-/// Elements that appear together, by time: those due within a `window`, s, at its end, so that nothing appears before
-/// it is printed; windows begin at the first time. With no window each time is its own. Elements at −∞ exist already,
-/// those at +∞ never appear.
+/// Elements that appear together, by time: those due within a `window`, s, at its end, so that nothing
+/// appears before it is printed; windows begin at the first time. With no window each time is its own.
+/// Elements at −∞ exist already, those at +∞ never appear.
 ///
 /// # Errors
 /// A time or window that is not a number, a negative window.

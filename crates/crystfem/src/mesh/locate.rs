@@ -7,9 +7,11 @@ use crate::mesh::Shape;
 use nalgebra::{Matrix3, Vector3};
 use polycore::numerics::hexahedron;
 
-/// Natural coordinates, and distances over an element's diagonal, that count as none: a place on a node has its value.
+/// Natural coordinates, and distances over an element's diagonal, that count as none: a place on a node has
+/// its value.
 const NEAR: f64 = 1e-9;
-/// What is added around an element's box, over its largest edge, where lines are cut: above rounding, and above `NEAR`.
+/// What is added around an element's box, over its largest edge, where lines are cut: above rounding, and
+/// above `NEAR`.
 const BOX: f64 = 1e-6;
 /// Iterations for the natural coordinates in a hexahedron; a parallelepiped needs two.
 const MOST_ITERATIONS: usize = 50;
@@ -62,8 +64,8 @@ impl Mesh {
         (distance <= rounding).then_some(weights)
     }
 
-    /// The elements around a place, m, and the shape functions there. A place outside, but no further than half an
-    /// element's extent along each axis, is moved into the nearest element; `None` beyond.
+    /// The elements around a place, m, and the shape functions there. A place outside, but no further than
+    /// half an element's extent along each axis, is moved into the nearest element; `None` beyond.
     pub fn locate(&self, at: [f64; 3]) -> Option<Place> {
         self.locate_in(0..self.element_count() as u32, at)
     }
@@ -132,8 +134,8 @@ impl Mesh {
     }
 }
 
-/// Shape functions at the nearest place in an element, how far that is, and what of it is rounding, m; `None` of a place
-/// further outside than half of its box.
+/// Shape functions at the nearest place in an element, how far that is, and what of it is rounding, m; `None`
+/// of a place further outside than half of its box.
 fn near(corners: &[[f64; 3]], at: [f64; 3]) -> Option<([f64; WIDE], f64, f64)> {
     let near = (0..3).all(|d| {
         let ends = corners.iter().map(|corner| corner[d]);
@@ -165,8 +167,9 @@ fn of_hexahedron(natural: Vector3<f64>) -> [f64; WIDE] {
     weights
 }
 
-/// Of wedges and second-order elements, by Newton's method from the middle; natural coordinates are taken to the nearest in
-/// the element. Close to a curved face, the nearest place is that of the nearest natural coordinates.
+/// Of wedges and second-order elements, by Newton's method from the middle; natural coordinates are taken to
+/// the nearest in the element. Close to a curved face, the nearest place is that of the nearest natural
+/// coordinates.
 fn in_other(shape: Shape, corners: &[[f64; 3]], at: [f64; 3]) -> [f64; WIDE] {
     let offset = |place: [f64; 3]| Vector3::from(place) - Vector3::from(corners[0]);
     let mut place = Vector3::from(natural::middle(shape));
@@ -293,7 +296,8 @@ mod tests {
         }
     }
 
-    /// Along lines through nodes, in faces, oblique and past the mesh: the places of `locate`, elements included.
+    /// Along lines through nodes, in faces, oblique and past the mesh: the places of `locate`, elements
+    /// included.
     #[test]
     fn lines_find_what_single_places_find() {
         for mesh in meshes() {

@@ -35,8 +35,8 @@ pub use structured::{Block, Grid, graded};
 pub use tube::Tube;
 pub use voxels::{RATIOS, Voxels};
 
-/// A face of an element: the element's number and the side, 0–5 of a hexahedron, 0–3 of a tetrahedron or 0–4 of a wedge,
-/// numbered as in Abaqus (S1 is side 0).
+/// A face of an element: the element's number and the side, 0–5 of a hexahedron, 0–3 of a tetrahedron or 0–4
+/// of a wedge, numbered as in Abaqus (S1 is side 0).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Face {
     /// Element: 8-node hexahedra first, 4-node tetrahedra after them, then all others.
@@ -45,8 +45,8 @@ pub struct Face {
     pub side: u8,
 }
 
-/// A mesh. Elements are numbered 8-node hexahedra first, then 4-node tetrahedra, then the others; nodes of an element are in
-/// the order of Abaqus ([`Shape`]).
+/// A mesh. Elements are numbered 8-node hexahedra first, then 4-node tetrahedra, then the others; nodes of an
+/// element are in the order of Abaqus ([`Shape`]).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
     /// Positions of the nodes, m.
@@ -68,8 +68,8 @@ pub struct Mesh {
 /// Sides of a box that bounds a mesh and the names of the surfaces on them: x−, x+, y−, y+, z−, z+.
 pub const BOX_SIDES: [&str; 6] = ["left", "right", "front", "back", "bottom", "top"];
 
-/// Nodes of a face: three or four corners, anticlockwise seen from outside, then the nodes on the middles of the edges of a
-/// second-order element, each after its first corner. Dereferences to a slice.
+/// Nodes of a face: three or four corners, anticlockwise seen from outside, then the nodes on the middles of
+/// the edges of a second-order element, each after its first corner. Dereferences to a slice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FaceNodes {
     nodes: [u32; 8],
@@ -203,16 +203,17 @@ impl Mesh {
         nodes
     }
 
-    /// The shapes of the elements if all are axis-parallel bricks, numbered from the corner with the least coordinates;
-    /// `None` otherwise. Edges count as parallel, and shapes as one, within 1e-9 of the shortest edge: element matrices
-    /// then agree to that, far below a discretisation error.
+    /// The shapes of the elements if all are axis-parallel bricks, numbered from the corner with the least
+    /// coordinates; `None` otherwise. Edges count as parallel, and shapes as one, within 1e-9 of the shortest
+    /// edge: element matrices then agree to that, far below a discretisation error.
     pub fn bricks(&self) -> Option<Bricks> {
         if !(self.tetrahedra.is_empty() && self.others.is_empty()) {
             return None;
         }
         let mut sizes: Vec<[f64; 3]> = Vec::new();
         let mut shape = Vec::with_capacity(self.hexahedra.len());
-        // shapes by their size in units that differ by 1e-9 between neighbours: most elements repeat the last shape
+        // shapes by their size in units that differ by 1e-9 between neighbours: most elements repeat the last
+        // shape
         let mut known: BTreeMap<[i64; 3], u32> = BTreeMap::new();
         let mut last = u32::MAX;
         for element in 0..self.hexahedra.len() as u32 {
@@ -248,8 +249,9 @@ impl Mesh {
         fits.then(|| size.into())
     }
 
-    /// The same mesh with its inner nodes moved, for patch tests: by `amplitude` times the box along x, −0.7 of that
-    /// along y and 0.5 along z, times ∏ sin(π ξ_d) with ξ from 0 to 1 through the box; the box keeps its shape.
+    /// The same mesh with its inner nodes moved, for patch tests: by `amplitude` times the box along x, −0.7
+    /// of that along y and 0.5 along z, times ∏ sin(π ξ_d) with ξ from 0 to 1 through the box; the box keeps
+    /// its shape.
     ///
     /// # Errors
     /// An amplitude whose deformation could invert an element: above 0.2 in size.

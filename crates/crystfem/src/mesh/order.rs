@@ -4,8 +4,9 @@ use super::{Cell, Mesh};
 use std::collections::HashMap;
 
 impl Mesh {
-    /// The same mesh with second-order elements: a new node on the middle of each edge, straight edges. Node sets take the new
-    /// nodes between two of theirs; elements that are of second order stay. Elements keep their numbers.
+    /// The same mesh with second-order elements: a new node on the middle of each edge, straight edges. Node
+    /// sets take the new nodes between two of theirs; elements that are of second order stay. Elements keep
+    /// their numbers.
     pub fn second_order(self) -> Self {
         let elements: Vec<u32> = (0..self.element_count() as u32).collect();
         let mut mesh =

@@ -136,13 +136,14 @@ pub struct ToolPath {
 }
 
 impl ToolPath {
-    /// A bar printed in lines along x, there and back: from `lower` to `upper` in x and y, lines of the bead's width (less
-    /// where they would not fill the bar evenly), `layers` of the bead's height upwards from z = 0, `velocity` while
-    /// printing and between lines, m/s; each layer begins `interval` s after the one before.
+    /// A bar printed in lines along x, there and back: from `lower` to `upper` in x and y, lines of the
+    /// bead's width (less where they would not fill the bar evenly), `layers` of the bead's height upwards
+    /// from z = 0, `velocity` while printing and between lines, m/s; each layer begins `interval` s after the
+    /// one before.
     ///
     /// # Errors
-    /// Extents, bead, velocity or number of layers that are not positive; an interval shorter than a layer takes; more
-    /// than 10⁸ lines.
+    /// Extents, bead, velocity or number of layers that are not positive; an interval shorter than a layer
+    /// takes; more than 10⁸ lines.
     pub fn raster(
         [lower, upper]: [[f64; 2]; 2],
         bead: Bead,
@@ -216,8 +217,8 @@ impl ToolPath {
     /// When each of the elements is covered by the bead, see [`Activation`].
     ///
     /// # Errors
-    /// A bead without width or height, an element that does not exist, a path that prints nothing, places or times that
-    /// are not finite.
+    /// A bead without width or height, an element that does not exist, a path that prints nothing, places or
+    /// times that are not finite.
     pub fn activation(&self, mesh: &Mesh, elements: &[u32], bead: Bead) -> Result<Activation, Error> {
         cover::activation(self, mesh, elements, bead)
     }

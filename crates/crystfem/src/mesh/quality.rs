@@ -9,16 +9,16 @@ use crate::error::Error;
 use crate::mesh::surface::Surface;
 use crate::mesh::{Face, Mesh};
 
-/// Least scaled Jacobian: det of the three edges at a corner over the product of their lengths, 1 for a brick, 1/√2 for
-/// the corner of a regular tetrahedron. Gradients on an element grow with its inverse: below this bound they lose six of
-/// fifteen digits.
+/// Least scaled Jacobian: det of the three edges at a corner over the product of their lengths, 1 for a
+/// brick, 1/√2 for the corner of a regular tetrahedron. Gradients on an element grow with its inverse: below
+/// this bound they lose six of fifteen digits.
 pub const LEAST_SCALED_JACOBIAN: f64 = 1e-6;
 
 /// Below this a note is made: the angle between an edge and the plane of two others is under 3°.
 pub const POOR_SCALED_JACOBIAN: f64 = 0.05;
 
-/// Greatest ratio of an element's longest to its shortest edge: conductances of an element go with its square, and
-/// (10⁷)² leaves two digits of the small one.
+/// Greatest ratio of an element's longest to its shortest edge: conductances of an element go with its
+/// square, and (10⁷)² leaves two digits of the small one.
 pub const GREATEST_ASPECT: f64 = 1e7;
 
 /// Above this a note is made.
@@ -39,14 +39,15 @@ pub struct Quality {
     pub notes: Vec<String>,
 }
 
-/// Checks a mesh. `labels` are the element numbers of the file it came from, for the messages; without them elements
-/// count from 0.
+/// Checks a mesh. `labels` are the element numbers of the file it came from, for the messages; without them
+/// elements count from 0.
 ///
 /// # Errors
-/// [`Error::Mesh`] with the element, its centre, the value found and what is allowed: no elements, a node number out of
-/// range or twice in an element, coordinates that are not finite, an inverted element or one without volume (Jacobian at
-/// a corner or at a Gauss point not positive), a scaled Jacobian below [`LEAST_SCALED_JACOBIAN`], edges over
-/// [`GREATEST_ASPECT`], an element twice, a face of three elements, a set that is empty or names what does not exist.
+/// [`Error::Mesh`] with the element, its centre, the value found and what is allowed: no elements, a node
+/// number out of range or twice in an element, coordinates that are not finite, an inverted element or one
+/// without volume (Jacobian at a corner or at a Gauss point not positive), a scaled Jacobian below
+/// [`LEAST_SCALED_JACOBIAN`], edges over [`GREATEST_ASPECT`], an element twice, a face of three elements, a
+/// set that is empty or names what does not exist.
 pub fn check(mesh: &Mesh, labels: Option<&[u64]>) -> Result<Quality, Error> {
     let elements = mesh.element_count();
     if elements == 0 {
@@ -172,7 +173,8 @@ impl Worst {
     }
 }
 
-/// Volume, least Jacobian determinant (of the map from the unit cube or corner), least scaled Jacobian, ratio of edges.
+/// Volume, least Jacobian determinant (of the map from the unit cube or corner), least scaled Jacobian, ratio
+/// of edges.
 fn measures(mesh: &Mesh, element: u32) -> [f64; 4] {
     let mut least = [f64::INFINITY; 2];
     let mut edges = [f64::INFINITY, 0.0];
@@ -216,8 +218,8 @@ fn measures(mesh: &Mesh, element: u32) -> [f64; 4] {
     [volume, least[0], least[1], edges[1] / edges[0]]
 }
 
-/// [`measures`] of a wedge or a second-order element: its Jacobian at corners and integration points, and between its corners
-/// the edges.
+/// [`measures`] of a wedge or a second-order element: its Jacobian at corners and integration points, and
+/// between its corners the edges.
 fn of_other(mesh: &Mesh, element: u32) -> [f64; 4] {
     let shape = mesh.shape(element);
     let x: Vec<Vector3<f64>> = mesh.nodes(element).iter().map(|&node| mesh.point(node)).collect();
@@ -370,8 +372,8 @@ fn parts(mesh: &Mesh) -> (usize, usize, usize) {
     (parts, unused, used.iter().position(|used| !used).unwrap_or(0))
 }
 
-/// Nodes that lie on others, within 1e-9 of the box's diagonal: their number and the first pair. Only nodes of the outer
-/// surface are looked at: faces between doubled nodes are outer faces.
+/// Nodes that lie on others, within 1e-9 of the box's diagonal: their number and the first pair. Only nodes
+/// of the outer surface are looked at: faces between doubled nodes are outer faces.
 fn doubles(mesh: &Mesh, surface: &Surface) -> Option<(usize, [u32; 2])> {
     let [lower, upper] = mesh.bounds()?;
     let near = 1e-9 * (Vector3::from(upper) - Vector3::from(lower)).norm();

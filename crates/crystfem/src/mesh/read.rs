@@ -4,8 +4,8 @@ use crate::error::Error;
 use crate::mesh::{ReadMesh, abaqus, gmsh};
 use std::path::Path;
 
-/// Reads a mesh file, `.msh` of Gmsh ([`gmsh::read`]) or `.inp` of Abaqus and CalculiX ([`abaqus::read`]), coordinates
-/// multiplied by `scale` (1e-3 for a file in mm), and checks it.
+/// Reads a mesh file, `.msh` of Gmsh ([`gmsh::read`]) or `.inp` of Abaqus and CalculiX ([`abaqus::read`]),
+/// coordinates multiplied by `scale` (1e-3 for a file in mm), and checks it.
 ///
 /// # Errors
 /// Another ending of the name, and what those functions refuse.

@@ -1,7 +1,7 @@
 //! Closed surfaces of triangles (STL), and the cells inside them.
 //!
-//! A reader of our own: `stl_io` 0.11 tells text from bytes by their first word, which binary files of some programs share,
-//! and its errors name no line.
+//! A reader of our own: `stl_io` 0.11 tells text from bytes by their first word, which binary files of some
+//! programs share, and its errors name no line.
 
 mod corners;
 mod shells;
@@ -14,13 +14,14 @@ use crate::mesh::voxels::{Frame, Voxels};
 
 /// Columns of rays in a cell along each axis: filled parts are exact along z and to about 1/8² across.
 const RAYS: usize = 8;
-/// By how much rays miss the middles of their part of a cell, in parts of it: edges lie on middles, seldom here.
+/// By how much rays miss the middles of their part of a cell, in parts of it: edges lie on middles, seldom
+/// here.
 const ASIDE: [f64; 2] = [1.3e-4, 0.7e-4];
 /// Least part of the volume, overlapping or inside shells that face inwards, that is noted.
 const TOLD: f64 = 1e-6;
 
-/// Closed shells of triangles. What any of them surrounds is inside, as slicers take it: overlaps count once. A shell that faces
-/// inwards inside another one is a cavity.
+/// Closed shells of triangles. What any of them surrounds is inside, as slicers take it: overlaps count once.
+/// A shell that faces inwards inside another one is a cavity.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stl {
     /// Corners, m, each once.
@@ -33,13 +34,14 @@ pub struct Stl {
     pub notes: Vec<String>,
 }
 
-/// Reads an STL file, ASCII or binary, coordinates multiplied by `scale` (1e-3 for a file in mm: the format has no unit), makes
-/// corners one that are closer than 1e-6 of the largest extent, turns shells that are inside out, and checks that they are closed.
-/// Normals of the file are not used.
+/// Reads an STL file, ASCII or binary, coordinates multiplied by `scale` (1e-3 for a file in mm: the format
+/// has no unit), makes corners one that are closer than 1e-6 of the largest extent, turns shells that are
+/// inside out, and checks that they are closed. Normals of the file are not used.
 ///
 /// # Errors
-/// [`Error::Shared`] where the file cannot be read; [`Error::File`] with the line of text, or the sizes in bytes, for what is no STL;
-/// [`Error::Mesh`] for edges that more triangles pass one way than the other, and no volume.
+/// [`Error::Shared`] where the file cannot be read; [`Error::File`] with the line of text, or the sizes in
+/// bytes, for what is no STL; [`Error::Mesh`] for edges that more triangles pass one way than the other, and
+/// no volume.
 pub fn read(path: &Path, scale: f64) -> Result<Stl, Error> {
     parse(path, &crate::file::read_bytes(path)?, scale)
 }
@@ -109,8 +111,9 @@ impl Stl {
         Ok(Frame::around(low, high, size)?.counts().map(|count| count as f64))
     }
 
-    /// The cells inside, from multiples of `size` on: 8 × 8 rays in z through each column of cells are inside where they have entered
-    /// more shells than they have left. Cells filled to less than `least` are left out. Beside them what overlaps, for the user.
+    /// The cells inside, from multiples of `size` on: 8 × 8 rays in z through each column of cells are inside
+    /// where they have entered more shells than they have left. Cells filled to less than `least` are left
+    /// out. Beside them what overlaps, for the user.
     ///
     /// # Errors
     /// A size that is not positive, more cells than can be numbered, a least part that no cell reaches.
@@ -179,8 +182,8 @@ impl Stl {
     }
 }
 
-/// Where a triangle crosses a ray along z, and whether it faces upwards (1) or downwards (−1); `None` where it does not. An edge gives its
-/// two triangles the same sign, so that the ray crosses one of them.
+/// Where a triangle crosses a ray along z, and whether it faces upwards (1) or downwards (−1); `None` where
+/// it does not. An edge gives its two triangles the same sign, so that the ray crosses one of them.
 fn crossing(triangle: &[u32; 3], points: &[[f64; 3]], at: [f64; 2]) -> Option<(f64, i32)> {
     let side = |p: u32, q: u32| {
         let [low, high] = [p.min(q), p.max(q)].map(|n| points[n as usize]);

@@ -7,7 +7,8 @@ use crate::mesh::{BOX_SIDES, Face, Mesh};
 /// Coordinates within this fraction of the extent are one.
 const SAME: f64 = 1e-9;
 
-/// Nodes of the largest mesh: 2²⁸, 15 GB of mesh alone; a slip in a size ends with a message instead of the machine.
+/// Nodes of the largest mesh: 2²⁸, 15 GB of mesh alone; a slip in a size ends with a message instead of the
+/// machine.
 pub(crate) const MAX_NODES: usize = 1 << 28;
 
 /// A named box, filled with elements.
@@ -82,8 +83,8 @@ impl Grid {
         Ok(grid)
     }
 
-    /// One block through the whole grid: hexahedra, an element set `name`, and surfaces and node sets on the sides of
-    /// the box, [`BOX_SIDES`].
+    /// One block through the whole grid: hexahedra, an element set `name`, and surfaces and node sets on the
+    /// sides of the box, [`BOX_SIDES`].
     ///
     /// # Errors
     /// Lines that do not ascend, or more nodes than 2²⁸.
@@ -94,8 +95,9 @@ impl Grid {
         self.blocks(&[Block { name: name.to_owned(), lower, upper }], Split::Hexahedra)
     }
 
-    /// Elements between the lines inside any block, sets of the elements in each block (blocks may overlap: an element
-    /// is in the set of each), and surfaces and node sets on the sides of the box around all, [`BOX_SIDES`].
+    /// Elements between the lines inside any block, sets of the elements in each block (blocks may overlap:
+    /// an element is in the set of each), and surfaces and node sets on the sides of the box around all,
+    /// [`BOX_SIDES`].
     ///
     /// # Errors
     /// Lines that do not ascend, a block without volume or without an element, or more nodes than 2²⁸.
@@ -148,8 +150,9 @@ impl Grid {
         Ok(split(mesh, &odd, cells))
     }
 
-    /// A hexahedron in each filled cell, x fastest: element sets `name` and, of each layer of cells with an element,
-    /// `layer-1`, … upwards, surfaces and node sets on the sides of the box around all, [`BOX_SIDES`].
+    /// A hexahedron in each filled cell, x fastest: element sets `name` and, of each layer of cells with an
+    /// element, `layer-1`, … upwards, surfaces and node sets on the sides of the box around all,
+    /// [`BOX_SIDES`].
     ///
     /// # Errors
     /// Lines that do not ascend, more nodes than 2²⁸, another number of cells, or none that is filled.

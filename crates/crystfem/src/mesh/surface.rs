@@ -7,8 +7,8 @@ use crate::mesh::{BOX_SIDES, Face, Mesh};
 /// No neighbour.
 const NONE: u32 = u32::MAX;
 
-/// The outer surface of the active elements: faces with exactly one active element. Neighbours are found once; each
-/// activation touches only the faces of the new elements.
+/// The outer surface of the active elements: faces with exactly one active element. Neighbours are found
+/// once; each activation touches only the faces of the new elements.
 #[derive(Clone, Debug)]
 pub struct Surface {
     /// Number of hexahedra and of elements.
@@ -16,8 +16,8 @@ pub struct Surface {
     elements: usize,
     /// First face of each of the other elements, and where the last ends.
     firsts: Vec<u32>,
-    /// The face on the other side of each face, or [`NONE`]; faces numbered 6·element + side, then 4·… for tetrahedra, then
-    /// those of the others.
+    /// The face on the other side of each face, or [`NONE`]; faces numbered 6·element + side, then 4·… for
+    /// tetrahedra, then those of the others.
     opposite: Vec<u32>,
     active: Vec<bool>,
     outer: Vec<bool>,
@@ -43,8 +43,8 @@ impl Surface {
     /// Neighbours of a mesh; no element is active.
     ///
     /// # Errors
-    /// A node that is none, a face of three elements (named), two elements with the corners of one face and different nodes on
-    /// its edges, or more than 2³² − 1 faces.
+    /// A node that is none, a face of three elements (named), two elements with the corners of one face and
+    /// different nodes on its edges, or more than 2³² − 1 faces.
     pub fn new(mesh: &Mesh) -> Result<Self, Error> {
         let (hexahedra, elements) = (mesh.hexahedra.len(), mesh.element_count());
         let mut count = 6 * hexahedra + 4 * mesh.tetrahedra.len();
@@ -137,9 +137,10 @@ impl Surface {
         (opposite != NONE).then(|| self.face(opposite))
     }
 
-    /// Where a boundary condition acts: `outer` (everywhere), a named surface (from whichever side its faces are
-    /// given), the part of the surface of a named element set, the faces whose nodes are all in a named node set, or a side of the box around the mesh
-    /// ([`BOX_SIDES`]: faces within 1e-9 of its diagonal). A name of the mesh comes before our own.
+    /// Where a boundary condition acts: `outer` (everywhere), a named surface (from whichever side its faces
+    /// are given), the part of the surface of a named element set, the faces whose nodes are all in a named
+    /// node set, or a side of the box around the mesh ([`BOX_SIDES`]: faces within 1e-9 of its diagonal). A
+    /// name of the mesh comes before our own.
     ///
     /// # Errors
     /// A name that is none of them, or a named surface with a face that does not exist.
@@ -244,8 +245,8 @@ impl Surface {
         }
     }
 
-    /// Sorts faces into buckets by their least node and pairs those of equal nodes: linear in the mesh, and the same
-    /// whatever the order of anything else.
+    /// Sorts faces into buckets by their least node and pairs those of equal nodes: linear in the mesh, and
+    /// the same whatever the order of anything else.
     fn neighbours(&self, mesh: &Mesh) -> Result<Vec<u32>, Error> {
         let key = |number: u32| mesh.face_nodes(self.face(number)).key();
         let all = |number: u32| {

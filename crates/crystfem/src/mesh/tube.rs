@@ -3,8 +3,8 @@
 use crate::error::Error;
 use crate::mesh::{BOX_SIDES, Grid, Mesh};
 
-/// A sector of a hollow cylinder around the z axis, from the plane y = 0 (x > 0) on towards y, its lower end at z = 0.
-/// Faces are plane: a body of N elements around differs from the cylinder by (angle/N)².
+/// A sector of a hollow cylinder around the z axis, from the plane y = 0 (x > 0) on towards y, its lower end
+/// at z = 0. Faces are plane: a body of N elements around differs from the cylinder by (angle/N)².
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tube {
     /// Radii of the bore and of the outside, m.
@@ -21,11 +21,12 @@ pub struct Tube {
 const SIDES: [&str; 6] = ["bore", "shell", "start", "end", "bottom", "top"];
 
 impl Tube {
-    /// Hexahedra: element set `tube`; surfaces and node sets `bore`, `shell`, `bottom`, `top`, and the cuts `start`
-    /// (y = 0) and `end`.
+    /// Hexahedra: element set `tube`; surfaces and node sets `bore`, `shell`, `bottom`, `top`, and the cuts
+    /// `start` (y = 0) and `end`.
     ///
     /// # Errors
-    /// Radii, an angle or a length without extent, elements of a quarter turn or more, no elements, or more nodes than 2²⁸.
+    /// Radii, an angle or a length without extent, elements of a quarter turn or more, no elements, or more
+    /// nodes than 2²⁸.
     pub fn mesh(&self) -> Result<Mesh, Error> {
         let wrong =
             |name, found, allowed: &str| Err(Error::Parameter { name, found, allowed: allowed.into() });

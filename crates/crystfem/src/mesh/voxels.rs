@@ -13,7 +13,8 @@ const BIN: f64 = 0.05;
 /// A body as cells.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Voxels {
-    /// Cells in which something is: element sets `part`, `layer-1`, … (layers of cells), and the sides of the box around them.
+    /// Cells in which something is: element sets `part`, `layer-1`, … (layers of cells), and the sides of the
+    /// box around them.
     pub mesh: Mesh,
     /// Filled part of each element; above 1 where beads overlap. Their volumes add up to `volume`.
     pub fill: Vec<f64>,
@@ -62,8 +63,8 @@ impl Frame {
         i + self.count[0] * (j + self.count[1] * k)
     }
 
-    /// Cells whose filled volume, m³, is at least `least` of the whole, of a body of `volume`; what is in others goes to
-    /// these in equal proportion. Beside them which cells they are.
+    /// Cells whose filled volume, m³, is at least `least` of the whole, of a body of `volume`; what is in
+    /// others goes to these in equal proportion. Beside them which cells they are.
     ///
     /// # Errors
     /// A least part that is not from 0 to 1, or that no cell reaches.
@@ -93,8 +94,8 @@ impl Frame {
 }
 
 impl Voxels {
-    /// Filled parts that differ by less than a twentieth made one, their mean, so that the volume stays: the values, and which
-    /// of them each element has.
+    /// Filled parts that differ by less than a twentieth made one, their mean, so that the volume stays: the
+    /// values, and which of them each element has.
     pub fn bins(&self) -> (Vec<f64>, Vec<usize>) {
         let key = |fill: f64| (fill / BIN).round() as u64;
         let mut sums = std::collections::BTreeMap::new();

@@ -58,7 +58,8 @@ impl<const N: usize> MaterialPoint<N> {
     }
 }
 
-/// Share of the way from one α to another at which a value lies: in ln(−ln(1 − α)), which Avrami's law makes linear in ln t.
+/// Share of the way from one α to another at which a value lies: in ln(−ln(1 − α)), which Avrami's law makes
+/// linear in ln t.
 fn share(before: f64, after: f64, value: f64) -> f64 {
     let of = |alpha: f64| (-(-alpha).ln_1p()).ln();
     let share = (of(value) - of(before)) / (of(after) - of(before));

@@ -29,7 +29,8 @@ fn cooling(rate: f64) -> Drive {
     Drive::Prescribed(History::from_legs(200.0 + ZERO, &[leg]).unwrap())
 }
 
-/// The events are those of exact quadrature; Gauss' rule at 0.5 K has an error in α of 2e-8, and dα/dT < 0.3 /K.
+/// The events are those of exact quadrature; Gauss' rule at 0.5 K has an error in α of 2e-8, and dα/dT < 0.3
+/// /K.
 #[test]
 fn events_of_a_cooling() {
     for constants in [Constants::TABLE_4_1_COLUMN_1, Constants::TABLE_4_1_COLUMN_2] {
@@ -53,9 +54,10 @@ fn events_of_a_cooling() {
     }
 }
 
-/// Erratum 9: Newton's cooling with τ such that the rate at 165 °C is 1, 2, 10 K/min. Latent heat shifts T(0.5) by
-/// +5.7, +6.1, +7.0 K and makes the time to α = 0.99 longer by 38, 35, 29 %: half a unit of each last digit. The
-/// reference (`reference/ch4/latent.py`) knows no melting; with it recalescence melts a little: +5.6 K at 1 K/min.
+/// Erratum 9: Newton's cooling with τ such that the rate at 165 °C is 1, 2, 10 K/min. Latent heat shifts
+/// T(0.5) by +5.7, +6.1, +7.0 K and makes the time to α = 0.99 longer by 38, 35, 29 %: half a unit of each
+/// last digit. The reference (`reference/ch4/latent.py`) knows no melting; with it recalescence melts a
+/// little: +5.6 K at 1 K/min.
 #[test]
 fn erratum_9_latent_heat_matters() {
     for (rate, shift, longer) in [(1.0, 5.7, 38.0), (2.0, 6.1, 35.0), (10.0, 7.0, 29.0)] {
@@ -80,7 +82,8 @@ fn erratum_9_latent_heat_matters() {
     }
 }
 
-/// Erratum 9: adiabatic rise ΔH X∞/c = 23.75 K; the energy does not change. In any number of steps, one included.
+/// Erratum 9: adiabatic rise ΔH X∞/c = 23.75 K; the energy does not change. In any number of steps, one
+/// included.
 #[test]
 fn adiabatic_rise() {
     let material = pa12(Constants::TABLE_4_1_COLUMN_1, Some(209e3));

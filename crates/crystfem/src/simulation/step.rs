@@ -126,8 +126,9 @@ impl Simulation {
         }
     }
 
-    /// Chooses the method anew once steps whose solves take more than [`FEWEST`] iterations have taken [`LEVELS`] of them, the cost of
-    /// preparing another method. Work is counted, not timed, so that a resumed run decides alike.
+    /// Chooses the method anew once steps whose solves take more than [`FEWEST`] iterations have taken
+    /// [`LEVELS`] of them, the cost of preparing another method. Work is counted, not timed, so that a
+    /// resumed run decides alike.
     fn reconsider(&mut self, before: &Work, until: f64) {
         let work = &self.state.work;
         let solves = (work.cg_solves - before.cg_solves) as f64;
@@ -171,8 +172,8 @@ impl Simulation {
         Ok(ratio)
     }
 
-    /// Whether points at nodes have one state, not an old and a new one: no attempt with steps of one length is rejected, and nothing but
-    /// the state itself depends on it.
+    /// Whether points at nodes have one state, not an old and a new one: no attempt with steps of one length
+    /// is rejected, and nothing but the state itself depends on it.
     fn in_place(&self) -> bool {
         matches!(self.settings.steps, Steps::Fixed { .. }) && !self.system.nodal.coupled
     }

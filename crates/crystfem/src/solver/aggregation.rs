@@ -1,7 +1,9 @@
-//! Levels of a multigrid method by smoothed aggregation (Vaněk, Mandel and Brezina 1996, doi:10.1007/BF02238511).
+//! Levels of a multigrid method by smoothed aggregation (Vaněk, Mandel and Brezina 1996,
+//! doi:10.1007/BF02238511).
 //!
-//! Only conduction is aggregated, so that the levels serve every length of a step and every capacity. Neighbours are near by place, not by
-//! their entry: in a cube of eight nodes two on an edge have none, and in a thin layer the near ones are above each other.
+//! Only conduction is aggregated, so that the levels serve every length of a step and every capacity.
+//! Neighbours are near by place, not by their entry: in a cube of eight nodes two on an edge have none, and
+//! in a thin layer the near ones are above each other.
 
 use rayon::prelude::*;
 
@@ -38,7 +40,8 @@ impl Sparse {
         all
     }
 
-    /// Rows made one by one, in work items; `fill` adds (column, value) pairs, of which those of one column are added up.
+    /// Rows made one by one, in work items; `fill` adds (column, value) pairs, of which those of one column
+    /// are added up.
     fn build(size: usize, columns: usize, fill: impl Fn(usize, &mut dyn FnMut(u32, f64)) + Sync) -> Self {
         let items: Vec<usize> = (0..size).step_by(ITEM).collect();
         let part = |place: &mut Vec<u32>, &first: &usize| {
@@ -120,7 +123,8 @@ pub struct Transfer {
     pub conduction: Sparse,
 }
 
-/// All levels below the finest. `neighbours` visits the entries of a row of the conduction matrix; what is not `free` has no unknown.
+/// All levels below the finest. `neighbours` visits the entries of a row of the conduction matrix; what is
+/// not `free` has no unknown.
 pub fn levels(
     free: &[f64],
     place: impl Fn(usize) -> [f64; 3],

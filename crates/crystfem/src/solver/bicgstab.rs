@@ -1,5 +1,5 @@
-//! Stabilized biconjugate gradients, for matrices that are not symmetric, with the diagonal as preconditioner on the right
-//! (van der Vorst 1992, doi:10.1137/0913035).
+//! Stabilized biconjugate gradients, for matrices that are not symmetric, with the diagonal as preconditioner
+//! on the right (van der Vorst 1992, doi:10.1137/0913035).
 
 use super::{Ended, Goal, Operator, norm_squared};
 use crate::system::vector::{set, sum};
@@ -15,8 +15,8 @@ pub struct BiconjugateGradients {
 }
 
 impl BiconjugateGradients {
-    /// Solves A x = r from x = 0; arguments as of [`super::ConjugateGradients::solve`]. It stops by the residual: at
-    /// √(Σ r²/diagonal / `capacity`) = `tolerance`.
+    /// Solves A x = r from x = 0; arguments as of [`super::ConjugateGradients::solve`]. It stops by the
+    /// residual: at √(Σ r²/diagonal / `capacity`) = `tolerance`.
     pub fn solve(
         &mut self,
         operator: &Operator,

@@ -14,7 +14,8 @@ impl<T> Cached<T> {
         self.key == Some(key)
     }
 
-    /// Returns whether the value was made for the same build of the equations, whose number is the upper half of the generation.
+    /// Returns whether the value was made for the same build of the equations, whose number is the upper half
+    /// of the generation.
     pub fn is_for_build(&self, build: u64) -> bool {
         self.key.is_some_and(|(generation, _)| generation >> 32 == build)
     }

@@ -1,8 +1,9 @@
-//! Conjugate gradients with the diagonal or a multigrid cycle as preconditioner, without a stored matrix where the mesh has equal rows.
+//! Conjugate gradients with the diagonal or a multigrid cycle as preconditioner, without a stored matrix
+//! where the mesh has equal rows.
 //!
-//! It stops by the error, not by the residual: eᵀAe after k steps is Σ_{j≥k} α_j (r_j·z_j) (Hestenes & Stiefel 1952,
-//! doi:10.6028/jres.049.044), continued here as a geometric series; and eᵀAe ≥ eᵀCe, C the capacity, so that the
-//! root of eᵀAe/ΣC bounds the capacity-weighted rms error of temperature.
+//! It stops by the error, not by the residual: eᵀAe after k steps is Σ_{j≥k} α_j (r_j·z_j) (Hestenes &
+//! Stiefel 1952, doi:10.6028/jres.049.044), continued here as a geometric series; and eᵀAe ≥ eᵀCe, C the
+//! capacity, so that the root of eᵀAe/ΣC bounds the capacity-weighted rms error of temperature.
 
 use super::Operator;
 use super::multigrid::Multigrid;
@@ -35,8 +36,8 @@ pub struct Goal<'a> {
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }
 
-/// Relative change of a solution by packed rows, in the norm of A: 2⁻²⁴ of the terms |a_ij| (x_i − x_j)²/2, which add up to at most about
-/// four times xᵀAx, as entries of both signs do.
+/// Relative change of a solution by packed rows, in the norm of A: 2⁻²⁴ of the terms |a_ij| (x_i − x_j)²/2,
+/// which add up to at most about four times xᵀAx, as entries of both signs do.
 const PACKED: f64 = 4.0 / 16_777_216.0;
 /// Part of the error that is left, and of the tolerance, that it may be.
 const UNSEEN: f64 = 0.03;
@@ -116,8 +117,8 @@ impl ConjugateGradients {
         std::mem::swap(&mut self.image, image);
     }
 
-    /// Solves A x = r from x = 0, with a multigrid cycle or the diagonal as preconditioner. `inverse` is one over A's diagonal, 0 where x
-    /// stays 0; `residual` becomes r − A x.
+    /// Solves A x = r from x = 0, with a multigrid cycle or the diagonal as preconditioner. `inverse` is one
+    /// over A's diagonal, 0 where x stays 0; `residual` becomes r − A x.
     pub fn solve(
         &mut self,
         mut multigrid: Option<&mut Multigrid>,
@@ -182,7 +183,8 @@ impl ConjugateGradients {
     }
 }
 
-/// r = right − A x, of A itself: the directions go on (van der Vorst & Ye 2000, doi:10.1137/S1064827599353865).
+/// r = right − A x, of A itself: the directions go on (van der Vorst & Ye 2000,
+/// doi:10.1137/S1064827599353865).
 fn renew(operator: &Operator, right: &[f64], inverse: &[f64], residual: &mut [f64], solution: &[f64]) {
     operator.exact().product(solution, residual);
     blend(residual, right, inverse, |image, right, inverse| if inverse == 0.0 { 0.0 } else { right - image });

@@ -39,10 +39,12 @@ pub struct Choice {
 
 /// Equations beyond which factors are too large: about 1.5 GB.
 const MOST_EQUATIONS: usize = 250_000;
-/// What a solve with multigrid costs in iterations with the diagonal: measured on blocks of 16³ to 48³ elements, a solve
-/// takes 10 to 21 cycles, and a cycle costs 3 to 5 iterations (up to 7 on bricks of equal elements).
+/// What a solve with multigrid costs in iterations with the diagonal: measured on blocks of 16³ to 48³
+/// elements, a solve takes 10 to 21 cycles, and a cycle costs 3 to 5 iterations (up to 7 on bricks of equal
+/// elements).
 const CYCLES: f64 = 64.0;
-/// What its levels, or an analysis for factors, cost. Measured there: 46 to 67 (up to 295 on bricks of equal elements).
+/// What its levels, or an analysis for factors, cost. Measured there: 46 to 67 (up to 295 on bricks of equal
+/// elements).
 pub const LEVELS: f64 = 300.0;
 
 /// What is known of a matrix before anything is solved.
@@ -83,11 +85,12 @@ impl Task {
 
     /// Compares the work of both in iterations of conjugate gradients.
     ///
-    /// With the diagonal as preconditioner the condition is at most 2·`stiffness` (Gershgorin: λmax ≤ 2; λmin ≥ C/A_ii),
-    /// and about `length`² at most; √κ/2·ln(2/ε) iterations gain ε, here 1e-4 from a first guess by extrapolation.
-    /// An iteration reads and writes 120 bytes for each equation and 12 for each stored entry. Factors have about
-    /// 11 n √s entries, s the equations across; a solve with them and their making were measured against that (bricks
-    /// of 20 000 and 97 000 equations, whose solves took 100 and 180 iterations, their making 800 and 3200).
+    /// With the diagonal as preconditioner the condition is at most 2·`stiffness` (Gershgorin: λmax ≤ 2; λmin
+    /// ≥ C/A_ii), and about `length`² at most; √κ/2·ln(2/ε) iterations gain ε, here 1e-4 from a first guess
+    /// by extrapolation. An iteration reads and writes 120 bytes for each equation and 12 for each stored
+    /// entry. Factors have about 11 n √s entries, s the equations across; a solve with them and their making
+    /// were measured against that (bricks of 20 000 and 97 000 equations, whose solves took 100 and 180
+    /// iterations, their making 800 and 3200).
     pub fn choose(&self) -> Choice {
         let by = |direct, reason: String| {
             let method = if direct { Method::Factors } else { Method::Diagonal };
@@ -151,7 +154,8 @@ impl Task {
         [3.9 * stored * across.sqrt(), 1.4 * stored * across / solves.max(1.0)]
     }
 
-    /// What takes over from the diagonal where a solve takes so many iterations and one matrix serves so many solves.
+    /// What takes over from the diagonal where a solve takes so many iterations and one matrix serves so many
+    /// solves.
     pub fn instead(&self, iterations: f64, solves: f64) -> Method {
         let [solve, factor] = self.direct(solves);
         let factors = if self.size > MOST_EQUATIONS { f64::INFINITY } else { solve + factor };

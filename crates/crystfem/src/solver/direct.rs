@@ -1,5 +1,5 @@
-//! Cholesky factors in the order of nested dissection: for large steps with an unchanged matrix. The analysis is made once for a system,
-//! factors once for a matrix.
+//! Cholesky factors in the order of nested dissection: for large steps with an unchanged matrix. The analysis
+//! is made once for a system, factors once for a matrix.
 
 use super::{Operator, dissection};
 use polycore::numerics::cholesky::{Cholesky, Pattern};
@@ -19,7 +19,8 @@ pub struct Direct {
 }
 
 impl Direct {
-    /// Analyses the pattern of the equations with `free` ≠ 0 at these places; `None` where memory does not suffice.
+    /// Analyses the pattern of the equations with `free` ≠ 0 at these places; `None` where memory does not
+    /// suffice.
     pub fn analyse(operator: &Operator, free: &[f64], place: impl Fn(u32) -> [f64; 3]) -> Option<Self> {
         let size = free.len();
         let equations: Vec<u32> = (0..size as u32).filter(|&e| free[e as usize] != 0.0).collect();
@@ -49,8 +50,8 @@ impl Direct {
         Some(Self { order, unknown, cholesky: Cholesky::analyse(pattern)?, values: Vec::new(), right })
     }
 
-    /// Factors a matrix of the analysed pattern. False where it is not positive definite to working precision, or
-    /// memory does not suffice.
+    /// Factors a matrix of the analysed pattern. False where it is not positive definite to working
+    /// precision, or memory does not suffice.
     pub fn factor(&mut self, operator: &Operator) -> bool {
         let pattern = self.cholesky.pattern();
         let mut entries = vec![0.0; pattern.rows.len()];

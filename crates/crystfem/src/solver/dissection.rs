@@ -1,13 +1,13 @@
-//! Nested dissection by coordinates: an order of elimination that keeps the factors of a mesh small (George 1973,
-//! doi:10.1137/0710032).
+//! Nested dissection by coordinates: an order of elimination that keeps the factors of a mesh small (George
+//! 1973, doi:10.1137/0710032).
 
 use polycore::numerics::bounds;
 
 /// Equations of a part that is not cut further.
 const SMALLEST: usize = 64;
 
-/// Equations in their order of elimination. A part is cut across its longest side; what lies beyond the cut and
-/// touches the other half comes last. `neighbours` visits the equations coupled to one.
+/// Equations in their order of elimination. A part is cut across its longest side; what lies beyond the cut
+/// and touches the other half comes last. `neighbours` visits the equations coupled to one.
 pub fn order(
     equations: Vec<u32>,
     size: usize,

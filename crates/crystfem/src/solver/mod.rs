@@ -33,7 +33,8 @@ pub struct Operator<'a> {
     pub weights: [f64; 2],
     /// Surfaces with consistent capacity.
     pub faces: &'a FaceMatrices,
-    /// M and K for the iterations, where rows are unequal: A with consistent capacity, K with lumped one. Rounded to single precision.
+    /// M and K for the iterations, where rows are unequal: A with consistent capacity, K with lumped one.
+    /// Rounded to single precision.
     pub packed: Option<&'a Packed>,
 }
 
@@ -72,13 +73,14 @@ pub struct Iterative {
 }
 
 impl Iterative {
-    /// Swaps the work vectors of conjugate gradients, the direction and A times it, with two vectors that are free until the next call.
+    /// Swaps the work vectors of conjugate gradients, the direction and A times it, with two vectors that are
+    /// free until the next call.
     pub fn swap_vectors(&mut self, direction: &mut Vec<f64>, image: &mut Vec<f64>) {
         self.conjugate.swap_vectors(direction, image);
     }
 
-    /// Solves A x = r from x = 0 by the method that suits the matrix. `inverse` is one over A's diagonal, 0 where x stays 0;
-    /// `residual` becomes r − A x, as the iterations know it.
+    /// Solves A x = r from x = 0 by the method that suits the matrix. `inverse` is one over A's diagonal, 0
+    /// where x stays 0; `residual` becomes r − A x, as the iterations know it.
     pub fn solve(
         &mut self,
         operator: &Operator,

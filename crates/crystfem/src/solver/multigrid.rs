@@ -1,6 +1,8 @@
-//! A V-cycle of smoothed aggregation as preconditioner: iterations depend neither on the mesh nor on the step.
+//! A V-cycle of smoothed aggregation as preconditioner: iterations depend neither on the mesh nor on the
+//! step.
 //!
-//! On each level A = D + a K, with D lumped and restricted like a residual, so that another step or capacity makes no new levels.
+//! On each level A = D + a K, with D lumped and restricted like a residual, so that another step or capacity
+//! makes no new levels.
 
 use super::Operator;
 use super::aggregation::{Sparse, Transfer, levels};

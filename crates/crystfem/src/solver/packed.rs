@@ -1,8 +1,10 @@
-//! A matrix for the iterations alone, where most rows are distinct: entries combined for one step, in single precision, eight rows side by side.
+//! A matrix for the iterations alone, where most rows are distinct: entries combined for one step, in single
+//! precision, eight rows side by side.
 //!
-//! Iterations on unequal rows take as long as reading them from memory does. Entries beside the diagonal are rounded to f32, and the diagonal
-//! takes what that leaves, so that sums of rows stay those of f64. The energy xᵀAx is then that of A to about 2⁻²⁴ in long and short
-//! steps alike; conjugate gradients go on from the residual of A itself before that shows.
+//! Iterations on unequal rows take as long as reading them from memory does. Entries beside the diagonal are
+//! rounded to f32, and the diagonal takes what that leaves, so that sums of rows stay those of f64. The
+//! energy xᵀAx is then that of A to about 2⁻²⁴ in long and short steps alike; conjugate gradients go on from
+//! the residual of A itself before that shows.
 
 use crate::system::Rows;
 use crate::system::vector::CHUNK;
@@ -292,8 +294,8 @@ mod tests {
     use super::*;
     use crate::system::Row;
 
-    /// A grid of 90 × 70 with unequal entries, of neighbours in order and of neighbours anywhere: products as with f64 to the rounding of
-    /// f32, and exactly so on uniform vectors.
+    /// A grid of 90 × 70 with unequal entries, of neighbours in order and of neighbours anywhere: products as
+    /// with f64 to the rounding of f32, and exactly so on uniform vectors.
     #[test]
     fn products_of_grids_and_of_unordered_rows() {
         let (width, height) = (90, 70);
@@ -345,7 +347,8 @@ mod tests {
         }
     }
 
-    /// Rows that change or come at the end have their work items packed anew, others not; the products are those of rows made at once.
+    /// Rows that change or come at the end have their work items packed anew, others not; the products are
+    /// those of rows made at once.
     #[test]
     fn what_has_not_changed_is_kept() {
         let fill = |scale: f64| {

@@ -38,7 +38,8 @@ impl Around {
             .filter(|&(element, _)| born[element as usize] != NONE)
     }
 
-    /// Sides of these elements that have a node of those wanted and that no other element shares, in the order of the elements.
+    /// Sides of these elements that have a node of those wanted and that no other element shares, in the
+    /// order of the elements.
     pub fn outer(
         &self,
         mesh: &Mesh,

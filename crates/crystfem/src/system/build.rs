@@ -1,7 +1,8 @@
 //! Adding elements to the equations: all that exist at first, and those of a birth later.
 //!
-//! A birth costs what it adds. Equations are appended ([`super::numbering`]); rows, capacity, points and faces are made anew at the nodes of
-//! new elements only, and what stands behind the first of them in a list moves. The result is that of building all at once, bit by bit.
+//! A birth costs what it adds. Equations are appended ([`super::numbering`]); rows, capacity, points and
+//! faces are made anew at the nodes of new elements only, and what stands behind the first of them in a list
+//! moves. The result is that of building all at once, bit by bit.
 
 use super::around::Around;
 use super::classes::{Class, OWN, VARYING, classify, matrices};
@@ -34,7 +35,8 @@ pub struct Moves {
 /// What elements did that were added.
 #[derive(Clone, Debug, Default)]
 pub struct Added {
-    /// Equations of their nodes, ascending, with the capacity of linear materials before, J/K; `None` where nothing was.
+    /// Equations of their nodes, ascending, with the capacity of linear materials before, J/K; `None` where
+    /// nothing was.
     pub before: Vec<(u32, Option<f64>)>,
     /// Points at nodes.
     pub nodal: Moves,
@@ -286,7 +288,8 @@ impl System {
         let Plan { around, kinds, classes, numbering, .. } = plan;
         rows.update(size, &touched.list, |index, row: &mut Row| {
             let around = || around.of(numbering.nodes[index], born);
-            // corners, classes and relative nodes of the elements around say all, but for elements of no class
+            // corners, classes and relative nodes of the elements around say all, but for elements of no
+            // class
             let repeated = row.begin(around().flat_map(|(element, corner)| {
                 let here = [corner as u32, u32::from(kinds[element as usize])];
                 let others = mesh.nodes(element).iter();
@@ -309,8 +312,8 @@ impl System {
         });
     }
 
-    /// Adds, at equations that are touched, what elements of no class have of their own, and the capacity of all; returns
-    /// ∫ N dV of each first-order element with a source.
+    /// Adds, at equations that are touched, what elements of no class have of their own, and the capacity of
+    /// all; returns ∫ N dV of each first-order element with a source.
     fn add_elements(
         &mut self,
         problem: &Problem,

@@ -1,14 +1,16 @@
 //! Material points in elements, for materials whose conductivity depends on temperature or state, and for all
 //! materials that are not linear when capacity is consistent.
 //!
-//! Point g has the temperature gradient of Gauss point g. With lumped capacity it has the temperature of corner g
-//! beside it, and its energy is counted there; with consistent capacity it has the temperature of the Gauss point.
-//! The matrix takes the symmetric part of −∂f/∂(∇T) and leaves ∂f/∂T out, so that it stays symmetric: Newton's
-//! iteration then converges linearly where k varies, with a rate of the relative change of k over the last iterate.
+//! Point g has the temperature gradient of Gauss point g. With lumped capacity it has the temperature of
+//! corner g beside it, and its energy is counted there; with consistent capacity it has the temperature of
+//! the Gauss point. The matrix takes the symmetric part of −∂f/∂(∇T) and leaves ∂f/∂T out, so that it stays
+//! symmetric: Newton's iteration then converges linearly where k varies, with a rate of the relative change
+//! of k over the last iterate.
 //!
-//! Where k jumps, that iteration stalls, and k at points would make the flux of an element depend on which of its points
-//! the jump has passed. There the flux is −D ∇θ with Kirchhoff's θ = ∫k dT at the nodes (Carslaw & Jaeger, §1.6), exact at
-//! nodes of a line at rest; its tangent ∇N_a·D∇N_b k(T_b) is complete, and not symmetric.
+//! Where k jumps, that iteration stalls, and k at points would make the flux of an element depend on which of
+//! its points the jump has passed. There the flux is −D ∇θ with Kirchhoff's θ = ∫k dT at the nodes (Carslaw &
+//! Jaeger, §1.6), exact at nodes of a line at rest; its tangent ∇N_a·D∇N_b k(T_b) is complete, and not
+//! symmetric.
 
 use super::rows::Rows;
 use super::{Evaluation, Moves, NONE, Points, StepInput};

@@ -1,12 +1,13 @@
 //! The equations of the elements that exist: Eq. (4.16) in space, before any choice of a time integrator.
 //!
-//! dE_i/dt + Q_i = 0 at each node i, with the energy E_i = ∫ N_i ρU dV and the heat that leaves the node,
-//! Q_i = −∫ ∇N_i·f dV + ∮ N_i q dA − ∫ N_i r dV.
-//! A [`System`] grows when elements appear: nodes of elements that do not exist have no equation. It holds
-//! the pattern and constant coefficients; [`System::evaluate`] gives E, Q and their tangents at a temperature.
+//! dE_i/dt + Q_i = 0 at each node i, with the energy E_i = ∫ N_i ρU dV and the heat that leaves the node, Q_i
+//! = −∫ ∇N_i·f dV + ∮ N_i q dA − ∫ N_i r dV. A [`System`] grows when elements appear: nodes of elements that
+//! do not exist have no equation. It holds the pattern and constant coefficients; [`System::evaluate`] gives
+//! E, Q and their tangents at a temperature.
 //!
-//! Three kinds of material: linear ones have no points at all; ones whose conductivity alone is constant are asked at
-//! nodes (one point for each node, material and birth); all others at the integration points of each element.
+//! Three kinds of material: linear ones have no points at all; ones whose conductivity alone is constant are
+//! asked at nodes (one point for each node, material and birth); all others at the integration points of each
+//! element.
 
 mod around;
 mod build;

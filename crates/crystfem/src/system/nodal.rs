@@ -1,7 +1,8 @@
 //! Material points at nodes: one for each node, material and birth, for materials with constant conductivity.
 //!
-//! All corners of elements of one material that were born together have one temperature history at a node, hence one
-//! state, whatever parts of these elements the material fills; a mesh of hexahedra needs an eighth of the calls that its Gauss points would need.
+//! All corners of elements of one material that were born together have one temperature history at a node,
+//! hence one state, whatever parts of these elements the material fills; a mesh of hexahedra needs an eighth
+//! of the calls that its Gauss points would need.
 
 use super::vector::{CHUNK, items};
 use super::{Behaviour, Evaluation, Moves, NONE, Points, StepInput};
@@ -38,7 +39,8 @@ pub struct Nodal {
     pub laws: Vec<Crystallization>,
     /// See `laws`.
     pub law_of: Vec<Option<u16>>,
-    /// Of each material the first one that has the same states, whatever part of the elements it fills: they share points.
+    /// Of each material the first one that has the same states, whatever part of the elements it fills: they
+    /// share points.
     pub like: Vec<u16>,
 }
 
@@ -90,8 +92,9 @@ impl Nodal {
         self.followers.get(usize::from(material)).is_some_and(|&follows| follows)
     }
 
-    /// Makes the points of these equations anew, ascending, and of all others up to `size`; `keys` gives birth and material of those that a
-    /// node has. Those have no mass yet. Returns where points were from the first that may have moved.
+    /// Makes the points of these equations anew, ascending, and of all others up to `size`; `keys` gives
+    /// birth and material of those that a node has. Those have no mass yet. Returns where points were from
+    /// the first that may have moved.
     pub fn replace(
         &mut self,
         size: usize,
@@ -166,8 +169,8 @@ impl Nodal {
         }
     }
 
-    /// Of the others: takes `states` to the end of the increment; returns their smallest wish for the next step over this one, and how many
-    /// there are.
+    /// Of the others: takes `states` to the end of the increment; returns their smallest wish for the next
+    /// step over this one, and how many there are.
     pub fn follow(
         &self,
         problem: &Problem,

@@ -1,8 +1,9 @@
 //! Which equation each node gets: equations are appended when elements appear, and never renumbered.
 //!
-//! Nodes are sorted by number within groups of births. Where births come layer by layer in a mesh that is numbered by layers, a group is a
-//! layer; else it has an eighth of what was there before. So lines of equal elements keep consecutive equations, and with them equal rows.
-//! A node of a group that does not exist yet has an equation that is out of use: an empty row that is not free.
+//! Nodes are sorted by number within groups of births. Where births come layer by layer in a mesh that is
+//! numbered by layers, a group is a layer; else it has an eighth of what was there before. So lines of equal
+//! elements keep consecutive equations, and with them equal rows. A node of a group that does not exist yet
+//! has an equation that is out of use: an empty row that is not free.
 
 use super::NONE;
 use crate::problem::Problem;
@@ -123,7 +124,8 @@ mod tests {
         );
     }
 
-    /// Element by element, against the order: each node once; those of a birth have an equation before its end; few are out of use.
+    /// Element by element, against the order: each node once; those of a birth have an equation before its
+    /// end; few are out of use.
     #[test]
     fn a_path_is_numbered_in_groups() {
         let (problem, born) = problem((64..384).rev().map(|element| vec![element]).collect());

@@ -1,10 +1,12 @@
-//! The conduction matrix (and the consistent capacity matrix) row by row, each distinct list of distances and of values stored once.
+//! The conduction matrix (and the consistent capacity matrix) row by row, each distinct list of distances and
+//! of values stored once.
 //!
-//! A row is a list of distances, column − row, and a list of values. On a mesh with lines of equal elements most consecutive rows are equal;
-//! a run of them is one segment, y_i = Σ_k v_k x_{i+o_k}, a stencil without any indices to gather. Elsewhere this is
-//! plain compressed rows: cells that a path fills in part have few distinct lists, which caches hold. Each row is written once: no colouring and no sums between threads, so the bits do not
-//! depend on them; gathering costs nothing over scattering because a stencil has 27 products where the elements
-//! around a node have 64.
+//! A row is a list of distances, column − row, and a list of values. On a mesh with lines of equal elements
+//! most consecutive rows are equal; a run of them is one segment, y_i = Σ_k v_k x_{i+o_k}, a stencil without
+//! any indices to gather. Elsewhere this is plain compressed rows: cells that a path fills in part have few
+//! distinct lists, which caches hold. Each row is written once: no colouring and no sums between threads, so
+//! the bits do not depend on them; gathering costs nothing over scattering because a stencil has 27 products
+//! where the elements around a node have 64.
 
 mod product;
 mod stencils;
@@ -39,8 +41,8 @@ pub struct Row {
 }
 
 impl Row {
-    /// Begins a row by what determines it. True where that is the same as for the row before: nothing needs to be
-    /// added then.
+    /// Begins a row by what determines it. True where that is the same as for the row before: nothing needs
+    /// to be added then.
     pub fn begin(&mut self, determinants: impl Iterator<Item = u32>) -> bool {
         self.new_key.clear();
         // iterated from within: chains of iterators are slow from outside
@@ -188,8 +190,9 @@ impl Rows {
         rows
     }
 
-    /// Makes these rows, ascending, and empty ones up to `size`; `fill` begins each row and says what is in it. Other rows stay. What it
-    /// leaves depends on the rows alone, not on how they came about, but for stencils that no row has any more.
+    /// Makes these rows, ascending, and empty ones up to `size`; `fill` begins each row and says what is in
+    /// it. Other rows stay. What it leaves depends on the rows alone, not on how they came about, but for
+    /// stencils that no row has any more.
     pub fn update(&mut self, size: usize, changed: &[u32], fill: impl Fn(usize, &mut Row) + Sync) {
         let Stencils { values, patterns, .. } = &self.stencils;
         if values.dead + patterns.dead > (values.entries() / MOST_DEAD).max(self.size) {
@@ -306,7 +309,8 @@ impl Rows {
         self.base = kept;
     }
 
-    /// Lists of values that rows have, segments of equal rows, and entries of K in these lists: of the rows alone, not of how they came about.
+    /// Lists of values that rows have, segments of equal rows, and entries of K in these lists: of the rows
+    /// alone, not of how they came about.
     pub fn stored(&self) -> [usize; 3] {
         let Stencils { values, .. } = &self.stencils;
         [values.used, self.segments.iter().map(Vec::len).sum(), values.entries() - values.dead]
@@ -337,7 +341,8 @@ impl Rows {
         }
     }
 
-    /// Takes the values of rows that are new since the last call as those to which [`Self::restore`] sets them.
+    /// Takes the values of rows that are new since the last call as those to which [`Self::restore`] sets
+    /// them.
     pub fn keep(&mut self) {
         let base = self.base.get_or_insert_default();
         let Stencils { conduction, capacity, .. } = &self.stencils;
@@ -418,8 +423,8 @@ impl Rows {
         self.multiply::<false>(diagonal, weights, x, y)
     }
 
-    /// y = K x as Σ_j K_ij (x_j − x_i): rows of K add up to nothing. Its rounding is that of the differences, so that
-    /// heat is conserved to rounding of what flows, not of what is stored.
+    /// y = K x as Σ_j K_ij (x_j − x_i): rows of K add up to nothing. Its rounding is that of the differences,
+    /// so that heat is conserved to rounding of what flows, not of what is stored.
     pub fn flow(&self, x: &[f64], y: &mut [f64]) {
         self.multiply::<true>(None, [0.0, 1.0], x, y);
     }

@@ -1,7 +1,7 @@
 //! Flux, film, radiation and sources on what exists.
 //!
-//! With lumped capacity they act at nodes, q(T_i) ∮ N_i dA, so that their tangent is diagonal and no cold neighbour
-//! can heat a node; with consistent capacity they act at the Gauss points of faces.
+//! With lumped capacity they act at nodes, q(T_i) ∮ N_i dA, so that their tangent is diagonal and no cold
+//! neighbour can heat a node; with consistent capacity they act at the Gauss points of faces.
 
 use super::{Evaluation, StepInput};
 use crate::boundary::{Condition, STEFAN_BOLTZMANN};
@@ -129,8 +129,8 @@ struct Part {
     radiates: bool,
     /// Equations with ∮ N dA, m², ascending.
     nodes: Vec<(u32, f64)>,
-    /// Equations that take a flux, those at which it is known, and ∮ N N dA, m²: of second-order faces, whose ∮ N dA is
-    /// negative at corners.
+    /// Equations that take a flux, those at which it is known, and ∮ N N dA, m²: of second-order faces, whose
+    /// ∮ N dA is negative at corners.
     pairs: Pairs,
     /// Faces, for film and radiation with consistent capacity.
     faces: Vec<Acting<4, 4>>,
@@ -144,7 +144,8 @@ pub struct Surfaces {
     parts: Vec<Part>,
     /// Source, and equations with ∫ N dV, m³, ascending.
     sources: Vec<(usize, Vec<(u32, f64)>)>,
-    /// Source, equations that take its heat, those at which it is known, and ∫ N N dV, m³, of second-order elements.
+    /// Source, equations that take its heat, those at which it is known, and ∫ N N dV, m³, of second-order
+    /// elements.
     wide_sources: Vec<(usize, Pairs)>,
 }
 
@@ -231,8 +232,8 @@ impl Surfaces {
         Self { parts: surfaces.map(part).collect(), sources, wide_sources: Vec::new() }
     }
 
-    /// Conditions at equations that are touched: on those of the faces there, which exist and are not covered, on which one `acts`. With
-    /// consistent capacity all equations are touched.
+    /// Conditions at equations that are touched: on those of the faces there, which exist and are not
+    /// covered, on which one `acts`. With consistent capacity all equations are touched.
     pub fn act(
         &mut self,
         problem: &Problem,
@@ -278,8 +279,8 @@ impl Surfaces {
         }
     }
 
-    /// A source at equations that are touched, with ∫ N dV of its first-order elements' nodes and ∫ N N dV of the others', which are never
-    /// born.
+    /// A source at equations that are touched, with ∫ N dV of its first-order elements' nodes and ∫ N N dV of
+    /// the others', which are never born.
     pub fn release(&mut self, source: usize, volumes: Vec<(u32, f64)>, pairs: Pairs, touched: &Touched) {
         touched.replace(&mut self.sources[source].1, volumes);
         if !pairs.is_empty() {

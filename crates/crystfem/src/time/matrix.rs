@@ -1,4 +1,5 @@
-//! The matrix A = C + M + a (K + faces) of a stage: its diagonal, its sums, what rounding leaves of a residual.
+//! The matrix A = C + M + a (K + faces) of a stage: its diagonal, its sums, what rounding leaves of a
+//! residual.
 
 use crate::solver::{Cached, Operator};
 use crate::system::vector::{blend, combine, dot, set};

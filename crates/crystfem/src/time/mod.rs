@@ -1,16 +1,17 @@
 //! From one time to the next.
 //!
-//! E' = −Q is integrated in terms of energy, so that every scheme conserves it: with stage rates Q_s and weights b_s,
-//! E(t+Δt) = E(t) − Δt Σ b_s Q_s. A stage solves E(T) − E(t) + a Q(T) + known = 0; a linear scene needs
-//! one linear solve for it, others Newton's iteration.
+//! E' = −Q is integrated in terms of energy, so that every scheme conserves it: with stage rates Q_s and
+//! weights b_s, E(t+Δt) = E(t) − Δt Σ b_s Q_s. A stage solves E(T) − E(t) + a Q(T) + known = 0; a linear
+//! scene needs one linear solve for it, others Newton's iteration.
 //!
 //! - backward Euler: one stage, order 1, L-stable; temperatures with lumped capacity never overshoot.
 //! - TR-BDF2 (Bank et al. 1985, doi:10.1109/T-ED.1985.22232; Hosea & Shampine 1996,
-//!   doi:10.1016/0168-9274(95)00115-8): two implicit stages with one matrix, order 2, L-stable. The first step after
-//!   a jump (start, birth) is backward Euler, which does not need the rate on the other side of the jump.
+//!   doi:10.1016/0168-9274(95)00115-8): two implicit stages with one matrix, order 2, L-stable. The first
+//!   step after a jump (start, birth) is backward Euler, which does not need the rate on the other side of
+//!   the jump.
 //!
-//! The temporal error is the difference to the embedded formula of the other order, filtered by the matrix of the
-//! stage (A e = Δt Σ(b_s − b̂_s) Q_s) so that stiff parts, which are damped at once, do not count.
+//! The temporal error is the difference to the embedded formula of the other order, filtered by the matrix of
+//! the stage (A e = Δt Σ(b_s − b̂_s) Q_s) so that stiff parts, which are damped at once, do not count.
 
 mod matrix;
 mod stage;

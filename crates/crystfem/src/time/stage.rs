@@ -46,7 +46,8 @@ pub struct Stage<'a> {
 pub struct Stages {
     /// E, Q and tangents at the last temperature.
     pub evaluation: Evaluation,
-    /// E − E(start) + a Q + known at the last temperature, J, prescribed nodes included; a correction takes it for its own.
+    /// E − E(start) + a Q + known at the last temperature, J, prescribed nodes included; a correction takes
+    /// it for its own.
     pub residual: Vec<f64>,
     /// What is wanted; factors and levels are made when first needed.
     pub method: Method,
@@ -138,8 +139,8 @@ impl Stages {
             let mut part = 1.0;
             let mut trial = std::mem::take(&mut self.trial);
             trial.resize(temperature.len(), 0.0);
-            // across a kink of a convex or concave balance whole steps come back by themselves, from one side; shorter
-            // ones creep towards the kink
+            // across a kink of a convex or concave balance whole steps come back by themselves, from one
+            // side; shorter ones creep towards the kink
             if square < best.0 {
                 best = (square, iteration);
             }
@@ -269,7 +270,8 @@ impl Stages {
         }
     }
 
-    /// The correction of temperature: A δ = −residual, and Σ(residual + A δ) = 0 over the free nodes to rounding.
+    /// The correction of temperature: A δ = −residual, and Σ(residual + A δ) = 0 over the free nodes to
+    /// rounding.
     fn correct(
         &mut self,
         problem: &Problem,
@@ -299,7 +301,8 @@ impl Stages {
                 self.factors.value = Direct::analyse(&operator, &system.free, place);
                 self.factors.forget();
             }
-            // without memory for factors, or with a matrix that is singular to rounding, the other method takes over
+            // without memory for factors, or with a matrix that is singular to rounding, the other method
+            // takes over
             if !(self.factors.is_for(key) && system.is_linear()) {
                 work.factorizations += 1;
                 if !self.factors.value.as_mut().is_some_and(|factors| factors.factor(&operator)) {

@@ -75,7 +75,8 @@ impl Stepper {
         Ok((evaluation.rate, evaluation.exchange))
     }
 
-    /// A step of length `dt`, which ends at `end`; the temporal error is estimated to a fraction of `accuracy`, if given.
+    /// A step of length `dt`, which ends at `end`; the temporal error is estimated to a fraction of
+    /// `accuracy`, if given.
     ///
     /// # Errors
     /// Those of the stages.

@@ -4,7 +4,8 @@ use super::*;
 use crate::kinetics::{Constants, Kinetics};
 use crate::melting::Melting;
 
-/// Against [`Crystallization::advance`] and α point by point: cold, hot, long and short increments, z from none to long crystallized.
+/// Against [`Crystallization::advance`] and α point by point: cold, hot, long and short increments, z from
+/// none to long crystallized.
 #[test]
 fn rows_are_points() {
     for (constants, melting) in [
@@ -76,7 +77,8 @@ fn rows_are_points() {
     }
 }
 
-/// Increments that are not finite, after others in pieces and in a shorter item: z tells of them, and others do not notice.
+/// Increments that are not finite, after others in pieces and in a shorter item: z tells of them, and others
+/// do not notice.
 #[test]
 fn increments_that_are_not_finite() {
     for melting in [Some(Melting::PA12), None] {

@@ -123,8 +123,8 @@ impl<'a> Cards<'a> {
         }
     }
 
-    /// The next keyword line; data lines before it are passed over. A parameter list that ends with a comma goes on in
-    /// the next line.
+    /// The next keyword line; data lines before it are passed over. A parameter list that ends with a comma
+    /// goes on in the next line.
     pub fn next(&mut self) -> Result<Option<Card>, Error> {
         while let Some((text, line, end)) = self.peek() {
             self.move_to(line, end);

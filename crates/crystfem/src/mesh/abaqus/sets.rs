@@ -51,7 +51,8 @@ pub(super) struct Resolver<'a> {
     pub path: &'a Path,
     pub nodes: &'a Labels,
     pub elements: &'a Labels,
-    /// Members that may still be visited, in proportion to the file: sets of sets and of ranges cannot run away.
+    /// Members that may still be visited, in proportion to the file: sets of sets and of ranges cannot run
+    /// away.
     pub budget: usize,
 }
 

@@ -173,8 +173,8 @@ fn sets_cannot_multiply_beyond_the_file() {
     refused(&format!("{BRICK}*NSET,NSET=s0\n1\n{doubling}"), &["members of sets"]);
 }
 
-/// One element of each type in the order of nodes and sides of the Abaqus manual (28.1.4, three-dimensional solids), with
-/// nodes on edges where that order has them: a wrong one would fold the element.
+/// One element of each type in the order of nodes and sides of the Abaqus manual (28.1.4, three-dimensional
+/// solids), with nodes on edges where that order has them: a wrong one would fold the element.
 #[test]
 fn elements_of_all_types() {
     let places: [[f64; 3]; 8] = [

@@ -7,9 +7,10 @@ use crate::mesh::Mesh;
 /// CalculiX reads the first twenty letters of a number.
 const WIDTH: usize = 20;
 
-/// Writes nodes, elements, sets and surfaces, numbers counted from 1, coordinates to the last bit where twenty letters
-/// hold it and to 1e-12 elsewhere. `diffusive` elements are DC3D8, DC3D4, … (Abaqus), otherwise C3D8, C3D4, … (CalculiX takes both,
-/// structural ones for `*HEAT TRANSFER` too). Names with spaces or commas are written with underscores.
+/// Writes nodes, elements, sets and surfaces, numbers counted from 1, coordinates to the last bit where
+/// twenty letters hold it and to 1e-12 elsewhere. `diffusive` elements are DC3D8, DC3D4, … (Abaqus),
+/// otherwise C3D8, C3D4, … (CalculiX takes both, structural ones for `*HEAT TRANSFER` too). Names with spaces
+/// or commas are written with underscores.
 ///
 /// # Errors
 /// Of the writer.

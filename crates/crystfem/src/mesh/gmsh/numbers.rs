@@ -56,7 +56,8 @@ impl<'a> Numbers<'a> {
         line_error(self.path, self.line, what, found, allowed)
     }
 
-    /// `$MeshFormat`: a version, 0 or 1 (binary), bytes of a size; in binary the number 1 in the file's byte order.
+    /// `$MeshFormat`: a version, 0 or 1 (binary), bytes of a size; in binary the number 1 in the file's byte
+    /// order.
     pub fn header(&mut self) -> Result<Version, Error> {
         let mut line = self.text_line();
         // comments may stand before it

@@ -181,8 +181,8 @@ fn groups_cannot_multiply_beyond_the_file() {
     refused(&text, &["members of physical groups"]);
 }
 
-/// A quarter of a ring, radii 1 and 2, height 1, one element high, of second order on curved edges; written by Gmsh 4.15 in
-/// both formats, whose orders of nodes differ.
+/// A quarter of a ring, radii 1 and 2, height 1, one element high, of second order on curved edges; written
+/// by Gmsh 4.15 in both formats, whose orders of nodes differ.
 #[test]
 fn second_order_meshes_written_by_gmsh() {
     for (name, count) in [("second_hexes", 3), ("second_wedges", 6), ("second_tets", 18)] {
@@ -236,7 +236,8 @@ fn complete_second_order_is_reduced() {
     assert!((total / 3e-6 - 1.0).abs() < 1e-12);
 }
 
-/// One tetrahedron in all versions, by hand: parametric nodes, several groups, no groups, comments, negative tags.
+/// One tetrahedron in all versions, by hand: parametric nodes, several groups, no groups, comments, negative
+/// tags.
 #[test]
 fn versions_by_hand() {
     let points = ["0 0 0", "1 0 0", "0 1 0", "0 0 1"];

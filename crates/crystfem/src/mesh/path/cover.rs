@@ -18,8 +18,8 @@ pub struct Bead {
     pub height: f64,
 }
 
-/// When elements are covered: when the nozzle is nearest to the centre of an element, in the first move whose bead holds
-/// that centre.
+/// When elements are covered: when the nozzle is nearest to the centre of an element, in the first move whose
+/// bead holds that centre.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Activation {
     /// Time of each element of the mesh, s: −∞ for those not requested, +∞ for those never covered.
@@ -32,8 +32,8 @@ pub struct Activation {
 }
 
 impl Activation {
-    /// Gives elements never covered the time at which the last bead at their height was finished, as if gaps between beads
-    /// were filled. Those with no bead at their height remain missed; their number comes back.
+    /// Gives elements never covered the time at which the last bead at their height was finished, as if gaps
+    /// between beads were filled. Those with no bead at their height remain missed; their number comes back.
     pub fn fill(&mut self, mesh: &Mesh) -> usize {
         let (levels, height) = (&self.levels, self.height);
         let times = &mut self.times;

@@ -6,8 +6,9 @@ use crate::table::{Column, read_with_lines};
 use polycore::units::dimension::{LengthDimension, RatioDimension, TimeDimension};
 use std::path::Path;
 
-/// Reads a path from a CSV table with columns `time [unit]` (not descending), `x [unit]`, `y [unit]`, `z [unit]`, in s and m
-/// where a heading has no unit, and `print`: not 0 where the move that ends there lays material down.
+/// Reads a path from a CSV table with columns `time [unit]` (not descending), `x [unit]`, `y [unit]`, `z
+/// [unit]`, in s and m where a heading has no unit, and `print`: not 0 where the move that ends there lays
+/// material down.
 ///
 /// # Errors
 /// As [`crate::table::read`]; times that descend.

@@ -20,12 +20,14 @@ pub struct Cells {
     pub filament: f64,
     /// Height of all beads, m; `None`: as the file tells, or down to what lies below.
     pub height: Option<f64>,
-    /// Cells with a smaller filled part are left out; the volume in them goes to the others in equal proportion.
+    /// Cells with a smaller filled part are left out; the volume in them goes to the others in equal
+    /// proportion.
     pub least: f64,
 }
 
 impl Cells {
-    /// Cells of these edges, m, for filament of 1.75 mm: beads as high as the file tells, cells that are a tenth full.
+    /// Cells of these edges, m, for filament of 1.75 mm: beads as high as the file tells, cells that are a
+    /// tenth full.
     pub fn new(size: [f64; 3]) -> Self {
         Self { size, filament: super::FILAMENT, height: None, least: 0.1 }
     }
@@ -52,12 +54,12 @@ impl ToolPath {
         Ok(frame(&self.beads(cells)?, cells)?.counts().map(|count| count as f64))
     }
 
-    /// The cells that beads fill: each bead is a box of its volume, as wide as its cross-section over its height, below the
-    /// nozzle, which is counted in pieces of a quarter of a cell.
+    /// The cells that beads fill: each bead is a box of its volume, as wide as its cross-section over its
+    /// height, below the nozzle, which is counted in pieces of a quarter of a cell.
     ///
     /// # Errors
-    /// Sizes that are not positive, a path that extrudes nothing, a bead without height, more cells than can be numbered, and
-    /// a least filled part that leaves none.
+    /// Sizes that are not positive, a path that extrudes nothing, a bead without height, more cells than can
+    /// be numbered, and a least filled part that leaves none.
     pub fn deposit(&self, cells: &Cells) -> Result<Deposit, Error> {
         let beads = self.beads(cells)?;
         let frame = frame(&beads, cells)?;
@@ -195,8 +197,8 @@ mod tests {
         parse(Path::new("a.gcode"), text.as_bytes()).unwrap()
     }
 
-    /// Twenty lines of 10 mm, 0.5 mm apart and 0.25 mm high, whose filament fills 0.8 of that, in two layers: every cell is filled
-    /// to 0.8, in the order of the lines.
+    /// Twenty lines of 10 mm, 0.5 mm apart and 0.25 mm high, whose filament fills 0.8 of that, in two layers:
+    /// every cell is filled to 0.8, in the order of the lines.
     #[test]
     fn lines_fill_their_cells() {
         let fed = 0.8 * 10.0 * 0.5 * 0.25 / (0.25 * PI * 1.75f64.powi(2));
@@ -246,8 +248,8 @@ mod tests {
         }
     }
 
-    /// Files of slicers in cells: as counted by reference/print/gcode.py, its grid around both ends of all moves, with
-    /// the purge line at 0.3 mm down to the bed.
+    /// Files of slicers in cells: as counted by reference/print/gcode.py, its grid around both ends of all
+    /// moves, with the purge line at 0.3 mm down to the bed.
     #[test]
     fn files_in_cells() {
         let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures");

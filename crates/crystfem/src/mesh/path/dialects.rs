@@ -345,8 +345,8 @@ fn ends_at_rest(time: f64, v: f64, a: f64, j: f64) -> f64 {
     time + (v * v - (v - j).powi(2)) / (2.0 * a * v)
 }
 
-/// A square of one wall as PrusaSlicer writes it for a MINI: fifteen layers with retractions, wipes and lifts, which it
-/// estimates at 67 s.
+/// A square of one wall as PrusaSlicer writes it for a MINI: fifteen layers with retractions, wipes and
+/// lifts, which it estimates at 67 s.
 #[test]
 fn time_of_prusa_slicer() {
     let mut text = "M201 X1250 Y1250 Z400 E5000\nM203 X180 Y180 Z12 E80\nM204 P1250 R1250 T1250\nM205 X8 Y8 Z2 E10\nM83\n\

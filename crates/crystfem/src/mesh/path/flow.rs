@@ -6,7 +6,8 @@ use std::f64::consts::PI;
 /// Levels closer than this are one, m.
 const SAME: f64 = 5e-8;
 
-/// Width of a bead of cross-section `area` and height `height`, m: a rectangle between two half circles, A/h + h(1 − π/4).
+/// Width of a bead of cross-section `area` and height `height`, m: a rectangle between two half circles, A/h
+/// + h(1 − π/4).
 pub fn stadium_width(area: f64, height: f64) -> f64 {
     area / height + height * (1.0 - 0.25 * PI)
 }

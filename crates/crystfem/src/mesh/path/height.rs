@@ -138,8 +138,8 @@ impl Found {
 impl ToolPath {
     /// Height of each printing move's bead, m, `height` of all where it is given. Otherwise what the file
     /// tells; otherwise down to the highest earlier bead below it, or to the bed. A bead over air, which
-    /// cannot be as high as the gap, has the height of others at its level, or down to the next level; in a vase the rise of a turn.
-    /// `filament`: its diameter, m.
+    /// cannot be as high as the gap, has the height of others at its level, or down to the next level; in a
+    /// vase the rise of a turn. `filament`: its diameter, m.
     pub(super) fn heights(&self, filament: f64, height: Option<f64>) -> Vec<f64> {
         if let Some(height) = height {
             return vec![height; self.printing().count()];

@@ -14,8 +14,8 @@ impl ToolPath {
         self.moves.iter().filter(|one| one.prints)
     }
 
-    /// The box around the middle lines of what is laid down, m: z from the bed side of the lowest bead to the highest
-    /// nozzle. `None` of a path that prints nothing.
+    /// The box around the middle lines of what is laid down, m: z from the bed side of the lowest bead to the
+    /// highest nozzle. `None` of a path that prints nothing.
     pub fn bounds(&self, bead: Bead) -> Option<[[f64; 3]; 2]> {
         let [mut low, high] = box_around(self.printing().flat_map(|one| [one.from, one.to]))?;
         low[2] -= bead.height;
@@ -42,8 +42,8 @@ impl ToolPath {
         self.shifted([shift(0), shift(1), 0.0])
     }
 
-    /// The share of what is laid down, by length, whose middle line lies in none of some elements: half a bead below the
-    /// nozzle, looked up every half width, or less often along a very long path.
+    /// The share of what is laid down, by length, whose middle line lies in none of some elements: half a
+    /// bead below the nozzle, looked up every half width, or less often along a very long path.
     pub fn outside(&self, mesh: &Mesh, elements: &[u32], bead: Bead) -> f64 {
         let length = |one: &Move| (0..3).map(|d| (one.to[d] - one.from[d]).powi(2)).sum::<f64>().sqrt();
         let whole: f64 = self.printing().map(length).sum();

@@ -31,9 +31,10 @@ fn durations(ramps: &[Ramp], exit: f64) -> Vec<f64> {
 }
 
 impl ToolPath {
-    /// The same path with trapezoidal velocities: along each move the velocity changes by `acceleration` at most, m/s², and
-    /// from move to move by `jerk` along each axis, m/s (as Marlin's classic jerk). Waits, and filament
-    /// alone, keep their time and let velocity pass. Velocity is even along each move of the result.
+    /// The same path with trapezoidal velocities: along each move the velocity changes by `acceleration` at
+    /// most, m/s², and from move to move by `jerk` along each axis, m/s (as Marlin's classic jerk). Waits,
+    /// and filament alone, keep their time and let velocity pass. Velocity is even along each move of the
+    /// result.
     ///
     /// # Errors
     /// An acceleration or a jerk that is not positive.

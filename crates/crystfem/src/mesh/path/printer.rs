@@ -176,8 +176,8 @@ impl Printer {
         Ok(())
     }
 
-    /// Length of an arc in the XY plane from a place to the present one, and the ends of its chords, of equal angles: the same
-    /// XY is a full circle; z rises evenly.
+    /// Length of an arc in the XY plane from a place to the present one, and the ends of its chords, of equal
+    /// angles: the same XY is a full circle; z rises evenly.
     fn arc(
         &self,
         from: [f64; 3],

@@ -10,8 +10,8 @@ fn refused(text: &str, words: &[&str]) {
     assert!(words.iter().all(|word| error.contains(word)), "{error}");
 }
 
-/// A plate of 20 × 10 × 2 elements of 0.5 mm, 0.2 mm high, and lines along x at the rows' middles, there and back,
-/// 10 mm/s.
+/// A plate of 20 × 10 × 2 elements of 0.5 mm, 0.2 mm high, and lines along x at the rows' middles, there and
+/// back, 10 mm/s.
 fn plate() -> (Mesh, ToolPath) {
     let mesh = Grid::uniform([0.0; 3], [0.01, 0.005, 4e-4], [20, 10, 2]).unwrap().mesh("plate").unwrap();
     let mut text = "G21\nG90\nM83\nG0 X0 Y0.25 Z0.2 F600\n".to_owned();
@@ -250,8 +250,8 @@ fn where_a_path_lies() {
     assert_eq!(ToolPath::default().bounds(bead), None);
 }
 
-/// The arcs of tinyg's test: 270° clockwise and 90° anticlockwise of radius 10, a full circle of 20, a half one by R; exact
-/// lengths, chords within 0.01 mm, and filament along them.
+/// The arcs of tinyg's test: 270° clockwise and 90° anticlockwise of radius 10, a full circle of 20, a half
+/// one by R; exact lengths, chords within 0.01 mm, and filament along them.
 #[test]
 fn arcs_have_their_lengths() {
     let path = parsed(
@@ -287,7 +287,8 @@ fn arcs_have_their_lengths() {
     assert!((middle[1] + 0.0254).abs() < 1e-4 && (middle[2] - 0.0127).abs() < 4e-4, "{middle:?}");
 }
 
-/// From rest to rest: L/v + v/a where the velocity is reached, 2√(L/a) where not; through a corner of 90° at jerk speed.
+/// From rest to rest: L/v + v/a where the velocity is reached, 2√(L/a) where not; through a corner of 90° at
+/// jerk speed.
 #[test]
 fn accelerations_take_their_time() {
     let time = |text: &str| parsed(text).accelerated(0.5, 0.008).unwrap().duration();
@@ -307,7 +308,8 @@ fn accelerations_take_their_time() {
     assert!(parsed("G1 X1 F60\n").accelerated(0.0, 1.0).is_err());
 }
 
-/// cube.gcode of the formulation: the first line's bead is 0.449985 mm wide; widths of a bead from its filament.
+/// cube.gcode of the formulation: the first line's bead is 0.449985 mm wide; widths of a bead from its
+/// filament.
 #[test]
 fn beads_come_from_filament() {
     let path = parsed("M83\nG1 F600 Z0.25\nG1 X10 E0.4\nG1 Z0.5\nG1 X0 E0.4\nM106 S127.5\nG1 E-1\n");

@@ -8,8 +8,8 @@ use crate::file::line_error;
 /// Three of each triangle, and what was passed over.
 pub(super) type Corners = (Vec<[f32; 3]>, Option<String>);
 
-/// Reads either form: bytes where the number of triangles that bytes 81 to 84 announce fits into the file (as text these four are
-/// above half a milliard), whatever the header says.
+/// Reads either form: bytes where the number of triangles that bytes 81 to 84 announce fits into the file (as
+/// text these four are above half a milliard), whatever the header says.
 ///
 /// # Errors
 /// [`Error::File`] with the line of text, or the sizes in bytes.

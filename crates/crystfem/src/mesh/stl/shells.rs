@@ -8,7 +8,8 @@ use super::crossing;
 use crate::error::Error;
 use nalgebra::Vector3;
 
-/// By how much a point that tells where a shell is lies inside its box, in parts of it: not on another shell's edges.
+/// By how much a point that tells where a shell is lies inside its box, in parts of it: not on another
+/// shell's edges.
 const INWARDS: f64 = 1.37e-4;
 
 /// Corners closer than this part of the largest extent are one.
@@ -62,8 +63,9 @@ pub(super) fn weld(points: &[[f64; 3]]) -> Vec<u32> {
     first
 }
 
-/// The shells of a closed surface: along every edge as many triangles pass one way as the other. Two bodies may share an edge, or a
-/// face. Triangles that are there twice are left out if the surface is not closed with them.
+/// The shells of a closed surface: along every edge as many triangles pass one way as the other. Two bodies
+/// may share an edge, or a face. Triangles that are there twice are left out if the surface is not closed
+/// with them.
 ///
 /// # Errors
 /// [`Error::Mesh`] with the edges that are not so.
@@ -201,8 +203,9 @@ fn closed(path: &Path, points: &[[f64; 3]], edges: &Edges) -> Result<(), Error> 
     )))
 }
 
-/// Turns what is inside out: all, where the shells together have no volume otherwise, then shells that leave a place inside or
-/// outside of them that none surrounds. What faces inwards inside another shell is a cavity. Returns the volume, m³.
+/// Turns what is inside out: all, where the shells together have no volume otherwise, then shells that leave
+/// a place inside or outside of them that none surrounds. What faces inwards inside another shell is a
+/// cavity. Returns the volume, m³.
 pub(super) fn orient(
     points: &[[f64; 3]],
     triangles: &mut [[u32; 3]],

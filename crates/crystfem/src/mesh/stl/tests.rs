@@ -215,7 +215,8 @@ fn corners_are_welded_at_a_tolerance_of_the_size() {
     assert!(stl.notes.iter().any(|note| note.contains("1 of them smaller")), "{:?}", stl.notes);
 }
 
-/// Corners of triangles on edges of others, one and three on an edge: the surface is closed all the same; a hole is not.
+/// Corners of triangles on edges of others, one and three on an edge: the surface is closed all the same; a
+/// hole is not.
 #[test]
 fn corners_on_edges_of_others_close_a_surface() {
     let [a, c, d] = [[0.0, 0.0, 10.0], [10.0, 10.0, 10.0], [0.0, 10.0, 10.0]];

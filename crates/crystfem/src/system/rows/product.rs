@@ -64,7 +64,8 @@ impl<const FLOW: bool> WithSimd for Product<'_, FLOW> {
     }
 }
 
-/// Σ v_j (x_j − `own`) of a row whose columns come in threes: vectors of four numbers, whose last one belongs to no sum.
+/// Σ v_j (x_j − `own`) of a row whose columns come in threes: vectors of four numbers, whose last one belongs
+/// to no sum.
 #[inline(always)]
 fn in_threes(offsets: &[i32], values: &[f64], x: &[f64], row: usize, own: f64) -> f64 {
     let mut sums = [0.0; 4];

@@ -1,5 +1,6 @@
-//! What rows are made of: distances of their columns, and values. Each distinct list of either is stored once, so that equal cells that are
-//! numbered differently share values, and unequal ones that are numbered alike share distances.
+//! What rows are made of: distances of their columns, and values. Each distinct list of either is stored
+//! once, so that equal cells that are numbered differently share values, and unequal ones that are numbered
+//! alike share distances.
 
 use crate::system::NONE;
 use std::collections::HashMap;

@@ -48,8 +48,9 @@ fn a_line_has_few_stencils_and_the_right_product() {
     assert_eq!(rows.largest(|row, value| if row < 100 { row as f64 } else { value }), 99.0);
 }
 
-/// Rows of a grid 40 wide that alternate between seven lists of values: their products by vectors of four, up to the last row, whose columns
-/// end where the numbers do; births change values again and again, and lists that no row has any more are dropped.
+/// Rows of a grid 40 wide that alternate between seven lists of values: their products by vectors of four, up
+/// to the last row, whose columns end where the numbers do; births change values again and again, and lists
+/// that no row has any more are dropped.
 #[test]
 fn rows_that_alternate_share_their_values() {
     let (width, size) = (40_i64, 2 * CHUNK + 100);
