@@ -1,10 +1,11 @@
-//! Births: elements that appear with a temperature, and conserve energy.
+//! Births: elements appear with a given temperature, and energy is conserved.
 //!
-//! A node of new elements only takes their temperature. A node that old and new elements share takes the
-//! temperature T* at which the energy counted at it is the sum of what both had: Σ_old m [U(T*) − U(T_old)] +
-//! Σ_new m [U(T*) − U(T_birth)] = 0, with the material's own energy and what its state does in a jump of no
-//! duration (Δt = 0). Nothing is lost, however thin the layer; with linear materials it is the mixture by
-//! heat capacity. A prescribed temperature stays, and its support takes the difference.
+//! A node of new elements only takes their temperature. A node shared by old and new elements takes the
+//! temperature T* at which its energy is the sum of both contributions:
+//! Σ_old m [U(T*) − U(T_old)] + Σ_new m [U(T*) − U(T_birth)] = 0.
+//! U is the energy of the material, with the change of its state in a jump of no duration (Δt = 0). So the
+//! balance closes for layers of any thickness; for linear materials T* is the mean weighted by heat capacity.
+//! A prescribed temperature stays, and its support exchanges the difference.
 
 use crate::element::{self, Geometry, MOST, WIDE, WIDE_POINTS};
 use crate::error::Error;
@@ -15,7 +16,7 @@ use crate::time::Steps;
 use nalgebra::Vector3;
 use std::collections::HashMap;
 
-/// Iterations for a temperature of mixture at most; bisection alone needs about 60.
+/// Limit on iterations for a mixing temperature; bisection alone needs about 60.
 const MOST_ITERATIONS: usize = 200;
 
 /// Material at a node that may change its temperature.
@@ -25,10 +26,10 @@ struct Part {
     mass: f64,
     /// Temperature, K.
     temperature: f64,
-    /// U there, J/kg.
+    /// U at this temperature, J/kg.
     energy: f64,
     state: Vec<f64>,
-    /// Where its state and energy are kept.
+    /// Kind of the points: `true` for points of general materials, `false` for nodal ones.
     general: bool,
     point: usize,
     old: bool,
@@ -46,7 +47,7 @@ struct Sum {
 }
 
 impl Simulation {
-    /// Lets appear what is due.
+    /// Activates the elements due now.
     pub(crate) fn give_birth(&mut self) -> Result<(), Error> {
         let first = self.state.births;
         while let Some(birth) = self.problem.births.get(self.state.births)
@@ -76,7 +77,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// After a jump: no slope, no rate, the first step's length.
+    /// Resets the rates and the step length after a jump.
     fn restart(&mut self) {
         self.state.slope.clear();
         self.state.rate.clear();
@@ -87,7 +88,7 @@ impl Simulation {
         self.forget();
     }
 
-    /// Points of what exists at the start, at its temperature.
+    /// Initializes the points of the elements that exist at the start, at their temperature.
     pub(crate) fn fresh_points(&mut self) -> Result<(), Error> {
         let (problem, system) = (&self.problem, &self.system);
         let mut memory = Memory::empty(system);
@@ -123,7 +124,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Linear material of the elements born since `first`, at their nodes.
+    /// Sums linear material of the elements born since `first`, by node.
     fn linear_sums(&self, first: usize) -> Result<HashMap<u32, Sum>, Error> {
         let mut sums: HashMap<u32, Sum> = HashMap::new();
         for birth in &self.problem.births[first..self.state.births] {
@@ -151,7 +152,7 @@ impl Simulation {
         Ok(sums)
     }
 
-    /// Makes room for what is new in temperatures and points, and mixes at the nodes in `sums`.
+    /// Extends temperatures and points by those of new elements, and mixes at the nodes in `sums`.
     fn migrate(&mut self, state: &mut State, added: &Added, sums: &HashMap<u32, Sum>) -> Result<(), Error> {
         let (problem, system) = (&self.problem, &self.system);
         let Memory { nodal, general } = &mut state.memory;
@@ -171,7 +172,7 @@ impl Simulation {
         let mut prescribed = vec![0.0; if system.fixed.is_empty() { 0 } else { system.size() }];
         system.prescribe(problem, state.time, &mut prescribed);
         for &(equation, before) in &added.before {
-            // with consistent capacity all are touched
+            // with consistent capacity all nodes change
             let Some(sum) = sums.get(&equation) else { continue };
             let (k, existed) = (equation as usize, before.is_some());
             let old = state.temperature[k];
@@ -188,7 +189,7 @@ impl Simulation {
                 let points = if part.general { &mut state.memory.general } else { &mut state.memory.nodal };
                 let stride = part.state.len();
                 points.state[part.point * stride..(part.point + 1) * stride].copy_from_slice(&part.state);
-                // that of others is in `sum`
+                // linear materials are in `sum`
                 if part.mass > 0.0 {
                     let before = std::mem::replace(&mut points.energy[part.point], part.energy);
                     change += part.mass * if part.old { part.energy - before } else { part.energy };
@@ -204,7 +205,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// What is at a node, old and new.
+    /// Returns the materials at a node, old and new.
     fn parts(&self, state: &State, added: &Added, equation: u32) -> Vec<Part> {
         let (problem, system) = (&self.problem, &self.system);
         let old = state.temperature[equation as usize];
@@ -243,7 +244,7 @@ impl Simulation {
     }
 }
 
-/// Materials that meet at a node.
+/// Old and new material at one node.
 struct Mixture<'a> {
     /// ΣρcV of old linear material, J/K.
     capacity: f64,
@@ -254,7 +255,7 @@ struct Mixture<'a> {
 }
 
 impl Mixture<'_> {
-    /// The common temperature; `parts` take their state and energy there.
+    /// Solves for the common temperature, and updates state and energy of `parts`.
     fn settle(&self, simulation: &Simulation, fixed: Option<f64>, parts: &mut [Part]) -> Result<f64, Error> {
         let (mut low, mut high) = (self.sum.coldest, self.sum.hottest);
         if self.existed {
@@ -304,7 +305,7 @@ impl Mixture<'_> {
 }
 
 impl Part {
-    /// U, ∂U/∂T and the state after a jump to a temperature.
+    /// Returns U, ∂U/∂T and the state after a jump to a temperature.
     fn at(&self, simulation: &Simulation, temperature: f64) -> Result<(f64, f64, Vec<f64>), Error> {
         let material = &simulation.problem.materials[usize::from(self.material)];
         let count = material.state_names().len();
@@ -317,7 +318,7 @@ impl Part {
 }
 
 impl Memory {
-    /// Room for the points of a system.
+    /// Allocates the points of a system.
     pub(crate) fn empty(system: &System) -> Self {
         let room = |points: usize, stride: usize, energies: usize| Points {
             state: vec![0.0; points * stride],
@@ -333,7 +334,7 @@ impl Memory {
 }
 
 impl Points {
-    /// Fresh material at a temperature.
+    /// Returns fresh material at a temperature.
     fn fresh(
         &mut self,
         problem: &crate::problem::Problem,
@@ -350,7 +351,7 @@ impl Points {
         }
     }
 
-    /// Moves points, with their energies or without; `fresh` makes the new ones.
+    /// Moves points, with or without their energies; `fresh` initializes new ones.
     fn rearrange(&mut self, moves: &Moves, stride: usize, energies: bool, fresh: impl Fn(&mut Self, usize)) {
         let state = self.state.split_off(moves.first * stride);
         let energy = if energies { self.energy.split_off(moves.first) } else { Vec::new() };

@@ -1,4 +1,4 @@
-//! What acts on a body: prescribed temperatures, flux, film, radiation, heat sources. Temperatures in K.
+//! Boundary conditions and heat sources: prescribed temperature, flux, film, radiation. Temperatures in K.
 
 use crate::error::Error;
 use crate::mesh::Face;
@@ -7,27 +7,27 @@ use std::sync::Arc;
 /// Stefan–Boltzmann constant, W/(m² K⁴) (CODATA 2018).
 pub const STEFAN_BOLTZMANN: f64 = 5.670_374_419e-8;
 
-/// A value over time: linear between given times and constant outside of them, or swinging.
+/// A value over time: piecewise linear and constant outside its times, or a sine.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Schedule {
     times: Vec<f64>,
-    /// At the times; of a swing its two ends.
+    /// Values at the times; for a sine its lowest and highest value.
     values: Vec<f64>,
-    /// Of a swing, s.
+    /// Period of a sine, s; `None` if piecewise linear.
     period: Option<f64>,
 }
 
 impl Schedule {
-    /// The same value always.
+    /// Returns a constant.
     pub fn constant(value: f64) -> Self {
         Self { times: vec![0.0], values: vec![value], period: None }
     }
 
-    /// A sine between two values that passes their middle upwards at t = 0.
+    /// Returns a sine between two values with its mean, rising, at t = 0.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for values that are not finite, a high one below the low one, and a period that
-    /// is not above 0 and finite.
+    /// [`Error::Parameter`] for values that are not finite, `high` below `low`, and a period that is not
+    /// above 0 and finite.
     pub fn swing(low: f64, high: f64, period: f64) -> Result<Self, Error> {
         let wrong = |name, found, allowed: String| Err(Error::Parameter { name, found, allowed });
         if !low.is_finite() {
@@ -42,16 +42,15 @@ impl Schedule {
         Ok(Self { times: Vec::new(), values: vec![low, high], period: Some(period) })
     }
 
-    /// Of a swing, s.
+    /// Period of a sine, s.
     pub fn period(&self) -> Option<f64> {
         self.period
     }
 
-    /// Through (time, value) pairs. Steps land on their times.
+    /// Interpolates (time, value) pairs. Time steps end at their times.
     ///
     /// # Errors
-    /// [`Error::Parameter`] where there is none, where times do not ascend, and for values that are not
-    /// finite.
+    /// [`Error::Parameter`] for no pairs, times that do not ascend, and values that are not finite.
     pub fn linear(pairs: &[(f64, f64)]) -> Result<Self, Error> {
         let wrong = |name, found, allowed: &str| Error::Parameter { name, found, allowed: allowed.into() };
         if pairs.is_empty() {
@@ -75,15 +74,15 @@ impl Schedule {
         })
     }
 
-    /// The lowest value.
+    /// Lowest value.
     pub fn lowest(&self) -> f64 {
         self.values.iter().copied().fold(f64::INFINITY, f64::min)
     }
 
-    /// Value at a time, s.
+    /// Returns the value at a time, s.
     pub fn at(&self, time: f64) -> f64 {
         if let (Some(period), [low, high]) = (self.period, &self.values[..]) {
-            // whole periods first: the sine of a large argument loses digits
+            // remove whole periods first: the sine of a large argument loses digits
             let turn = (time / period).fract() * std::f64::consts::TAU;
             return 0.5 * (low + high) + 0.5 * (high - low) * turn.sin();
         }
@@ -98,7 +97,7 @@ impl Schedule {
         self.values[next - 1] + part * (self.values[next] - self.values[next - 1])
     }
 
-    /// Times where the slope changes; none of a constant.
+    /// Times at which the slope changes; empty for a constant.
     pub fn breaks(&self) -> &[f64] {
         if self.times.len() > 1 { &self.times } else { &[] }
     }
@@ -114,24 +113,24 @@ pub type Function = Arc<dyn Fn([f64; 3], f64) -> f64 + Send + Sync>;
 /// A value over space and time.
 #[derive(Clone)]
 pub enum Field {
-    /// The same everywhere.
+    /// Uniform in space.
     Uniform(Schedule),
     /// A function of position and time; it should be smooth in time.
     Function(Function),
 }
 
 impl Field {
-    /// The same value everywhere and always.
+    /// Returns a value constant in space and time.
     pub fn constant(value: f64) -> Self {
         Self::Uniform(Schedule::constant(value))
     }
 
-    /// A function of position, m, and time, s.
+    /// Wraps a function of position, m, and time, s.
     pub fn function(function: impl Fn([f64; 3], f64) -> f64 + Send + Sync + 'static) -> Self {
         Self::Function(Arc::new(function))
     }
 
-    /// Value at a place and time.
+    /// Returns the value at a position, m, and time, s.
     pub fn at(&self, place: [f64; 3], time: f64) -> f64 {
         match self {
             Self::Uniform(schedule) => schedule.at(time),
@@ -139,7 +138,7 @@ impl Field {
         }
     }
 
-    /// Times where the slope changes.
+    /// Times at which the slope changes.
     pub fn breaks(&self) -> &[f64] {
         match self {
             Self::Uniform(schedule) => schedule.breaks(),
@@ -147,7 +146,7 @@ impl Field {
         }
     }
 
-    /// Period of a swing, s.
+    /// Period of a sine, s.
     pub fn period(&self) -> Option<f64> {
         match self {
             Self::Uniform(schedule) => schedule.period(),
@@ -175,30 +174,30 @@ impl std::fmt::Debug for Field {
     }
 }
 
-/// Which faces a condition acts on. A face counts only while it is on the
-/// current outer surface: one element beside it exists and no other covers it.
+/// Faces on which a condition acts. A face counts only while it is on the current outer surface: exactly one
+/// of its elements exists.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Where {
-    /// These faces, given from either side.
+    /// Listed faces, in either orientation.
     Faces(Vec<Face>),
-    /// The current outer surface, except these faces.
+    /// Current outer surface, except some faces.
     Outer {
-        /// Faces left out.
+        /// Excluded faces.
         except: Vec<Face>,
     },
 }
 
 impl Where {
-    /// The whole current outer surface.
+    /// Returns the whole current outer surface.
     pub fn outer() -> Self {
         Self::Outer { except: Vec::new() }
     }
 }
 
-/// A boundary condition. Several may act on one face; their heat adds up.
+/// A boundary condition. Heat of several conditions on one face adds up.
 #[derive(Clone, Debug)]
 pub enum Condition {
-    /// Prescribed temperature, K, of nodes. Where two name one node, the later one holds.
+    /// Prescribed temperature, K, of nodes. The last condition on a node wins.
     Temperature {
         /// Nodes of the mesh.
         nodes: Vec<u32>,
@@ -207,14 +206,14 @@ pub enum Condition {
     },
     /// Heat flux into the body, W/m².
     Flux {
-        /// Where.
+        /// Faces.
         surface: Where,
         /// Heat into the body, W/m².
         inward: Field,
     },
     /// Heat loss h (T − T_a), W/m².
     Film {
-        /// Where.
+        /// Faces.
         surface: Where,
         /// h, W/(m² K).
         coefficient: Schedule,
@@ -223,7 +222,7 @@ pub enum Condition {
     },
     /// Heat loss ε σ (T⁴ − T_a⁴), W/m².
     Radiation {
-        /// Where.
+        /// Faces.
         surface: Where,
         /// ε, 0 to 1.
         emissivity: f64,
@@ -233,7 +232,7 @@ pub enum Condition {
 }
 
 impl Condition {
-    /// The surface it acts on; `None` for prescribed temperatures.
+    /// Faces of the condition; `None` for prescribed temperatures.
     pub fn surface(&self) -> Option<&Where> {
         match self {
             Self::Temperature { .. } => None,
@@ -243,7 +242,7 @@ impl Condition {
         }
     }
 
-    /// Times where a schedule's slope changes.
+    /// Times at which the slope of a schedule changes.
     pub fn breaks(&self) -> Vec<f64> {
         match self {
             Self::Temperature { value, .. } => value.breaks().to_vec(),
@@ -253,7 +252,7 @@ impl Condition {
         }
     }
 
-    /// Shortest period of its swings, s.
+    /// Shortest period of its sines, s.
     pub fn period(&self) -> Option<f64> {
         let periods = match self {
             Self::Temperature { value, .. } => [value.period(), None],
@@ -264,6 +263,8 @@ impl Condition {
         periods.into_iter().flatten().min_by(f64::total_cmp)
     }
 
+    /// Checks the values.
+    ///
     /// # Errors
     /// [`Error::Parameter`] for values out of their domain.
     pub(crate) fn check(&self) -> Result<(), Error> {
@@ -281,7 +282,7 @@ impl Condition {
             },
             Self::Flux { inward, .. } => inward.check("flux"),
             Self::Film { coefficient, ambient, .. } => {
-                // k/h is less than an atom there: no film, but a surface that is held
+                // at a higher h, k/h is below the size of an atom: the surface is held, not cooled
                 let bad = |h: &&f64| !(0.0..=1e12).contains(*h);
                 if let Some(&found) = coefficient.values.iter().find(bad) {
                     let allowed = "0 to 1e12 W/(m² K); beyond it, prescribe its `temperature`";
@@ -299,7 +300,7 @@ impl Condition {
     }
 }
 
-/// Heat released in a volume.
+/// A heat source in a volume.
 #[derive(Clone, Debug)]
 pub struct Source {
     /// Elements.
@@ -309,6 +310,8 @@ pub struct Source {
 }
 
 impl Source {
+    /// Checks the power.
+    ///
     /// # Errors
     /// [`Error::Parameter`] for a power that is not finite.
     pub(crate) fn check(&self) -> Result<(), Error> {
@@ -353,7 +356,7 @@ mod tests {
         {
             assert!(Schedule::swing(low, high, period).is_err());
         }
-        // whichever end is out of the domain is named
+        // the error names the end that is out of range
         let cold = Condition::Temperature {
             nodes: vec![0],
             value: Field::Uniform(Schedule::swing(-1.0, 9.0, 1.0).unwrap()),

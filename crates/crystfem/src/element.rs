@@ -1,9 +1,8 @@
-//! Hexahedra (2 × 2 × 2 Gauss points), tetrahedra (4 points) and wedges (6 points) of first order, and those
-//! of second order ([`natural`]): shapes, gradients, volumes, faces.
+//! First-order hexahedra (2 × 2 × 2 Gauss points), tetrahedra (4 points) and wedges (6 points), and
+//! second-order elements ([`natural`]): shape functions, gradients, volumes, faces.
 //!
-//! In first-order elements integration point g lies nearest to corner g. With lumped capacity, energy is
-//! counted at the corner and conduction at the Gauss point beside it, so each pair is one material point with
-//! one state.
+//! In first-order elements integration point g is nearest to corner g. Lumped capacity counts energy at the
+//! corner and conduction at the Gauss point beside it: each pair is one material point with one state.
 
 mod face;
 pub mod natural;
@@ -15,17 +14,16 @@ use natural::Rule;
 use polycore::numerics::hexahedron;
 pub use polycore::numerics::hexahedron::CORNERS;
 
-/// Nodes of a first-order element at most, and its integration points.
+/// Maximum number of nodes, and of integration points, of a first-order element.
 pub const MOST: usize = 8;
-/// Nodes of any element at most.
+/// Maximum number of nodes of any element.
 pub const WIDE: usize = 20;
-/// Integration points of any element at most.
+/// Maximum number of integration points of any element.
 pub const WIDE_POINTS: usize = 27;
 
 /// 1/√3: the abscissa of the two-point Gauss rule.
 const GAUSS: f64 = 0.577_350_269_189_625_8;
-/// The four-point rule of a tetrahedron, exact to degree 2: one barycentric coordinate is NEAR, three are
-/// FAR.
+/// Four-point rule of a tetrahedron, exact to degree 2: one barycentric coordinate is NEAR, three are FAR.
 const NEAR: f64 = 0.585_410_196_624_968_5;
 const FAR: f64 = 0.138_196_601_125_010_5;
 
@@ -34,7 +32,7 @@ const FAR: f64 = 0.138_196_601_125_010_5;
 pub struct Geometry<const N: usize = MOST, const P: usize = MOST> {
     /// Number of nodes.
     pub nodes: usize,
-    /// Number of integration points: as many as nodes in first-order elements.
+    /// Number of integration points; equals the number of nodes in first-order elements.
     pub points: usize,
     /// Gauss weight times the Jacobian of each point, m³.
     pub weights: [f64; P],
@@ -44,12 +42,12 @@ pub struct Geometry<const N: usize = MOST, const P: usize = MOST> {
     pub corner_volumes: [f64; N],
 }
 
-/// Number of integration points of an element of so many nodes.
+/// Number of integration points of an element with `nodes` nodes.
 pub fn points(nodes: usize) -> usize {
     rule(nodes).map_or(nodes, |rule| rule.points)
 }
 
-/// The rule of an element that is neither an 8-node hexahedron nor a 4-node tetrahedron.
+/// Integration rule of wedges and second-order elements; `None` for 8-node hexahedra and 4-node tetrahedra.
 fn rule(nodes: usize) -> Option<&'static Rule> {
     match nodes {
         8 | 4 => None,
@@ -78,8 +76,8 @@ pub fn shapes<const N: usize, const P: usize>(nodes: usize) -> [[f64; N]; P] {
 }
 
 impl<const N: usize, const P: usize> Geometry<N, P> {
-    /// Of the element with these nodes, at most `N`; `None` where a Jacobian is not positive (inverted, flat,
-    /// folded).
+    /// Computes the geometry of an element from its nodes, at most `N`; `None` if a Jacobian is not positive
+    /// (inverted, flat, folded).
     pub fn new(corners: &[[f64; 3]]) -> Option<Self> {
         let nodes = corners.len();
         let mut geometry = Self {
@@ -144,7 +142,7 @@ impl<const N: usize, const P: usize> Geometry<N, P> {
         matrix
     }
 
-    /// Adds one integration point's part of [`Self::conduction`], for a symmetric conductivity.
+    /// Adds the contribution of one integration point to [`Self::conduction`], for a symmetric conductivity.
     pub fn add_conduction(&self, point: usize, conductivity: &Matrix3<f64>, matrix: &mut [[f64; N]; N]) {
         let gradients = &self.gradients[point];
         for b in 0..self.nodes {
@@ -154,7 +152,7 @@ impl<const N: usize, const P: usize> Geometry<N, P> {
                     image[d] += self.weights[point] * conductivity[(d, n)] * gradients[b][n];
                 }
             }
-            // both triangles get the same bits: heat that leaves one node for another arrives there
+            // both triangles get the same bits: the heat that leaves one node arrives at the other
             for a in 0..=b {
                 let value = (0..3).map(|d| gradients[a][d] * image[d]).sum::<f64>();
                 matrix[a][b] += value;
@@ -165,7 +163,7 @@ impl<const N: usize, const P: usize> Geometry<N, P> {
         }
     }
 
-    /// The same with a factor on each column: the result is not symmetric.
+    /// Adds [`Self::add_conduction`] with a factor on each column; the result is not symmetric.
     pub fn add_scaled_conduction(
         &self,
         point: usize,
@@ -300,8 +298,7 @@ mod tests {
         assert!(<Geometry>::new(&[[f64::NAN; 3]; 4]).is_none());
     }
 
-    /// The sides of a second-order element close it, and a curved one has the volume that the divergence
-    /// theorem gives.
+    /// Sides of a second-order element close it, and a curved one has the volume of the divergence theorem.
     #[test]
     fn second_order_sides_close_the_element() {
         for shape in Shape::ALL {

@@ -1,25 +1,25 @@
-//! States of materials as fields over nodes.
+//! Material states as fields over nodes and elements.
 
 use crate::element::{self, MOST, WIDE, WIDE_POINTS};
 use crate::error::Error;
 use crate::simulation::Simulation;
 use crate::system::{NONE, Points};
 
-/// Statistics of a field over nodes, weighted by their volumes; all not finite where a value is not.
+/// Volume-weighted statistics of a field over nodes; not finite if a value is not.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Statistics {
-    /// Mean by volume.
+    /// Volume-weighted mean.
     pub mean: f64,
     /// Smallest value.
     pub least: f64,
     /// Largest value.
     pub largest: f64,
-    /// Standard deviation by volume.
+    /// Volume-weighted standard deviation.
     pub deviation: f64,
 }
 
 impl Statistics {
-    /// Of the nodes that have a value and a volume; `None` without any.
+    /// Computes the statistics over nodes that have a value and a volume; `None` if there are none.
     pub fn new(values: &[Option<f64>], volumes: &[f64]) -> Option<Self> {
         let (mut sum, mut volume) = (0.0, 0.0);
         let (mut least, mut largest) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -43,12 +43,12 @@ impl Statistics {
 }
 
 impl Simulation {
-    /// Names of the quantities that materials show, each once, in the order of the materials.
+    /// Names of the output quantities of all materials, without duplicates, in the order of the materials.
     pub fn field_names(&self) -> Vec<&'static str> {
         self.problem.field_names()
     }
 
-    /// A quantity of a material at one of its points; `None` where the material does not have it.
+    /// Returns a quantity of a material at one of its points; `None` if the material lacks it.
     fn value(&self, name: &str, points: &Points, stride: usize, point: usize, material: u16) -> Option<f64> {
         let law = &self.problem.materials[usize::from(material)];
         let (states, names) = (law.state_names().len(), law.field_names());
@@ -59,7 +59,7 @@ impl Simulation {
         Some(values[place])
     }
 
-    /// Σ m f and Σ m over the points at a node.
+    /// Returns Σ m f and Σ m over the points at a node.
     fn at_node(&self, name: &str, equation: usize) -> [f64; 2] {
         let (nodal, points) = (&self.system.nodal, &self.state.memory.nodal);
         let mut sums = [0.0; 2];
@@ -73,14 +73,14 @@ impl Simulation {
         sums
     }
 
-    /// [`Self::field`] at a node where all points are at nodes.
+    /// [`Self::field`] at a node if all points are at nodes.
     fn mean_at(&self, name: &str, node: u32) -> Option<f64> {
         let equation = self.system.equation.get(node as usize).filter(|equation| **equation != NONE)?;
         let [sum, mass] = self.at_node(name, *equation as usize);
         (mass > 0.0).then(|| sum / mass)
     }
 
-    /// [`Self::field`] at some nodes; looks at no others where all points are at nodes.
+    /// [`Self::field`] at some nodes; computes no others if all points are at nodes.
     pub fn field_of(&self, name: &str, nodes: &[u32]) -> Vec<Option<f64>> {
         if !self.system.general.is_empty() {
             let field = self.field(name);
@@ -89,8 +89,8 @@ impl Simulation {
         nodes.iter().map(|&node| self.mean_at(name, node)).collect()
     }
 
-    /// A quantity of the materials at all nodes of the mesh: the mean of the points there, weighted by mass;
-    /// `None` where no material has it or nothing exists.
+    /// Returns a quantity at all nodes of the mesh: the mass-weighted mean of the points at each; `None` at
+    /// nodes without material that has it.
     pub fn field(&self, name: &str) -> Vec<Option<f64>> {
         let (problem, system) = (&self.problem, &self.system);
         let nodes = problem.mesh.points.len();
@@ -120,7 +120,7 @@ impl Simulation {
                 }
             };
             if nodes.len() > MOST {
-                // all points of a second-order element, by the square of the shape function there
+                // all points of a second-order element, weighted by the squared shape function
                 let Some(geometry) = problem.mesh.geometry(number) else { continue };
                 let shapes = element::shapes::<WIDE, WIDE_POINTS>(nodes.len());
                 for (g, shapes) in shapes.iter().enumerate().take(geometry.points) {
@@ -138,8 +138,8 @@ impl Simulation {
         sum.iter().zip(&mass).map(|(sum, mass)| (*mass > 0.0).then(|| sum / mass)).collect()
     }
 
-    /// A quantity of the materials in each element: the mean of its own points, those of its material and
-    /// birth; `None` where its material does not have it or it does not exist.
+    /// Returns a quantity in each element: the mean over the element's points; `None` if the element does not
+    /// exist or its material lacks it.
     pub fn element_means(&self, name: &str) -> Vec<Option<f64>> {
         let (problem, system) = (&self.problem, &self.system);
         let mean = |sum: f64, count: usize| (count > 0).then(|| sum / count as f64);
@@ -148,7 +148,7 @@ impl Simulation {
             means.iter_mut().enumerate().filter(|(element, _)| self.is_born(*element as u32))
         {
             let (material, birth) = (problem.material_of[element], self.state.born[element]);
-            // general materials have no points at nodes, alike or not
+            // general materials have no points at nodes, uniform or not
             let like = system.nodal.like[usize::from(material)];
             let (mut sum, mut count) = (0.0, 0);
             for &node in problem.mesh.nodes(element as u32) {
@@ -175,17 +175,17 @@ impl Simulation {
         means
     }
 
-    /// A quantity of the materials at a place, as [`Self::field`] at its nodes; `None` where no material
-    /// there has it.
+    /// Returns a quantity at a position, interpolated from [`Self::field`]; `None` without a material that
+    /// has it.
     pub fn field_at(&self, name: &str, place: [f64; 3]) -> Option<f64> {
         let field = self.field(name);
         self.problem.mesh.locate(place)?.value(|node| field[node as usize])
     }
 
-    /// The first temperature, energy or state variable that is not finite, with its node and the time.
+    /// Checks that temperatures, energies and state variables are finite.
     ///
     /// # Errors
-    /// [`Error::NotFinite`].
+    /// [`Error::NotFinite`] with the first that is not, its node and the time.
     pub fn finite(&self) -> Result<(), Error> {
         let (problem, system, state) = (&self.problem, &self.system, &self.state);
         let fail = |quantity: &'static str, node: u32| {
@@ -222,7 +222,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Volume that each node has of the elements named that exist, m³: the weights of means over them.
+    /// Volume of each node within the existing elements among `elements`, m³: weights of means over them.
     pub fn volumes(&self, elements: &[u32]) -> Vec<f64> {
         let mut volumes = vec![0.0; self.problem.mesh.points.len()];
         for &number in elements.iter().filter(|&&element| self.is_born(element)) {

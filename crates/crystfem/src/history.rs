@@ -2,40 +2,40 @@
 
 use crate::error::Error;
 
-/// A temperature that runs linearly from point to point.
+/// A piecewise linear temperature history.
 #[derive(Clone, Debug, PartialEq)]
 pub struct History {
-    /// Times, s; equal neighbours are a jump.
+    /// Times, s; equal neighbours mark a jump.
     times: Vec<f64>,
     /// Temperatures, K.
     temperatures: Vec<f64>,
 }
 
-/// A part of a history.
+/// A leg of a history.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Leg {
-    /// To a temperature, K, at a rate, K/s.
+    /// Ramp to a temperature, K, at a rate, K/s.
     Rate {
-        /// K.
+        /// Final temperature, K.
         to: f64,
-        /// K/s, above 0 for heating and cooling alike.
+        /// Rate, K/s, above 0 for heating and cooling alike.
         rate: f64,
     },
-    /// To a temperature, K, in a time, s; 0: a jump.
+    /// Ramp to a temperature, K, in a time, s; 0 is a jump.
     Time {
-        /// K.
+        /// Final temperature, K.
         to: f64,
-        /// s.
+        /// Duration, s.
         duration: f64,
     },
-    /// The same temperature for a time, s.
+    /// Hold at the same temperature, s.
     Hold {
-        /// s.
+        /// Duration, s.
         duration: f64,
     },
 }
 
-/// From here to there.
+/// A linear segment of a history.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Segment {
     /// Times, s.
@@ -45,7 +45,7 @@ pub struct Segment {
 }
 
 impl Segment {
-    /// The temperature at a time within, K.
+    /// Interpolates the temperature at a time within the segment, K.
     pub fn at(&self, time: f64) -> f64 {
         let [from, to] = self.temperatures;
         let duration = self.times[1] - self.times[0];
@@ -57,11 +57,11 @@ impl Segment {
 }
 
 impl History {
-    /// From points.
+    /// Returns a history through points.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for no points, unequal columns, times that decrease, temperatures below 0 K, and
-    /// what is not finite.
+    /// [`Error::Parameter`] for no points, columns of different lengths, times that decrease, temperatures
+    /// below 0 K, and values that are not finite.
     pub fn new(times: Vec<f64>, temperatures: Vec<f64>) -> Result<Self, Error> {
         let refuse = |name, found, allowed: String| Err(Error::Parameter { name, found, allowed });
         if times.is_empty() || times.len() != temperatures.len() {
@@ -80,10 +80,10 @@ impl History {
         Ok(Self { times, temperatures })
     }
 
-    /// From time 0 and a temperature, K, by legs.
+    /// Builds a history of legs from time 0 and a temperature, K.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for rates that are not above 0, durations below 0, and as [`History::new`].
+    /// [`Error::Parameter`] for rates that are not above 0, durations below 0, and as for [`History::new`].
     pub fn from_legs(start: f64, legs: &[Leg]) -> Result<Self, Error> {
         let (mut times, mut temperatures) = (vec![0.0], vec![start]);
         let (mut time, mut temperature) = (0.0, start);
@@ -113,7 +113,7 @@ impl History {
     /// Reads a CSV file with the columns `time [unit]` and `temperature [unit]`.
     ///
     /// # Errors
-    /// [`Error::File`] as `table::read`, and where times decrease.
+    /// [`Error::File`] as for `table::read`, and for times that decrease.
     pub fn read(path: &std::path::Path) -> Result<Self, Error> {
         use crate::table::{Column, read_with_lines};
         use polycore::units::dimension::{TemperatureDimension, TimeDimension};
@@ -133,7 +133,7 @@ impl History {
         Self::new(times, temperatures)
     }
 
-    /// The first temperature, K.
+    /// Initial temperature, K.
     pub fn start(&self) -> f64 {
         self.temperatures[0]
     }
@@ -143,7 +143,7 @@ impl History {
         [self.times[0], self.times[self.times.len() - 1]]
     }
 
-    /// Its segments, jumps included.
+    /// Segments, jumps included.
     pub fn segments(&self) -> impl Iterator<Item = Segment> + '_ {
         (1..self.times.len()).map(|i| Segment {
             times: [self.times[i - 1], self.times[i]],

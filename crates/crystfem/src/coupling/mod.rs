@@ -1,7 +1,6 @@
-//! Physics that follows the temperatures of a simulation step by step: stress and warpage, healing of
-//! interfaces.
+//! Physics driven by the temperatures of a simulation: stress and warpage, healing of interfaces.
 //!
-//! A coupling sees the start and each accepted step
+//! A coupling is called at the start and after each accepted step
 //! ([`Simulation::observe`](crate::simulation::Simulation::observe)), and saves and restores its state for
 //! checkpoints.
 

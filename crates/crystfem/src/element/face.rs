@@ -3,8 +3,7 @@
 use super::{GAUSS, natural};
 use crate::shape::Shape;
 
-/// A face at its integration points: 2 × 2 Gauss points, or three on a triangle; 3 × 3 and six of second
-/// order.
+/// A face at its integration points: 2 × 2 Gauss points or three on a triangle; 3 × 3 or six in second order.
 #[derive(Clone, Debug)]
 pub struct FaceGeometry<const N: usize = 4, const P: usize = 4> {
     /// Number of nodes.
@@ -19,11 +18,11 @@ pub struct FaceGeometry<const N: usize = 4, const P: usize = 4> {
     pub corner_areas: [f64; N],
 }
 
-/// Corners of a quadrilateral in natural coordinates.
+/// Corners of a quadrilateral in natural coordinates, in order.
 const AROUND: [[f64; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
 
-/// N and ∂N/∂ξ of a second-order triangle (r, s ≥ 0) or quadrilateral (−1 … 1): those of the first side of
-/// the solid with such sides.
+/// N and ∂N/∂ξ of a second-order triangle (r, s ≥ 0) or quadrilateral (−1 … 1), from the first side of a
+/// solid element with such sides.
 fn second_order_face(nodes: usize, [r, s]: [f64; 2]) -> [(f64, [f64; 2]); 8] {
     let (shape, at, order): (_, _, &[usize]) = match nodes {
         8 => (Shape::Hexahedron20, [r, s, -1.0], &[0, 1, 2, 3, 8, 9, 10, 11]),
@@ -38,7 +37,7 @@ fn second_order_face(nodes: usize, [r, s]: [f64; 2]) -> [(f64, [f64; 2]); 8] {
 }
 
 impl<const N: usize, const P: usize> FaceGeometry<N, P> {
-    /// Of a face with these nodes: corners in order around it, then the middles of its edges.
+    /// Computes the geometry of a face from its nodes: corners in order around it, then mid-edge nodes.
     pub fn new(corners: &[[f64; 3]]) -> Self {
         let nodes = corners.len().min(N);
         let mut rule: [([f64; 2], f64); 9] = [([0.0; 2], 0.0); 9];

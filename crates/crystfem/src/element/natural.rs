@@ -8,7 +8,7 @@ use super::{CORNERS, WIDE, WIDE_POINTS};
 use crate::shape::Shape;
 use std::sync::OnceLock;
 
-/// N and ∂N/∂ξ of each node.
+/// N and ∂N/∂ξ of each node at one point.
 #[derive(Clone, Copy, Debug)]
 pub struct Natural {
     /// N.
@@ -24,7 +24,7 @@ pub struct Rule {
     pub points: usize,
     /// Weights.
     pub weights: [f64; WIDE_POINTS],
-    /// Shape functions there.
+    /// Shape functions at the points.
     pub at: Vec<Natural>,
 }
 
@@ -34,7 +34,8 @@ fn triangle(r: f64, s: f64) -> [(f64, [f64; 2]); 3] {
 }
 
 impl Natural {
-    /// At a place; of 8-node hexahedra and 4-node tetrahedra too.
+    /// Evaluates the shape functions at natural coordinates; any shape, 8-node hexahedra and 4-node
+    /// tetrahedra included.
     pub fn at(shape: Shape, [r, s, t]: [f64; 3]) -> Self {
         let mut natural = Self { shapes: [0.0; WIDE], gradients: [[0.0; 3]; WIDE] };
         match shape {
@@ -138,7 +139,7 @@ pub fn corner(shape: Shape, corner: usize) -> [f64; 3] {
     }
 }
 
-/// Its middle.
+/// Natural coordinates of the centre.
 pub fn middle(shape: Shape) -> [f64; 3] {
     match shape.corners() {
         8 => [0.0; 3],
@@ -151,7 +152,7 @@ pub fn middle(shape: Shape) -> [f64; 3] {
 pub const GAUSS_3: [(f64, f64); 3] =
     [(-0.774_596_669_241_483_4, 5.0 / 9.0), (0.0, 8.0 / 9.0), (0.774_596_669_241_483_4, 5.0 / 9.0)];
 
-/// Dunavant's rule of degree 4 on a triangle: two orbits of three points (coordinate that two share, weight
+/// Dunavant's rule of degree 4 on a triangle: two orbits of three points, each (repeated coordinate, weight
 /// over ½).
 pub const DUNAVANT: [(f64, f64); 2] = [
     (0.445_948_490_915_964_9, 0.223_381_589_678_011_47),
@@ -204,7 +205,7 @@ fn points(shape: Shape) -> Vec<([f64; 3], f64)> {
 }
 
 impl Rule {
-    /// Of a shape, made once.
+    /// Returns the rule of a shape, computed once.
     pub fn of(shape: Shape) -> &'static Self {
         static RULES: [OnceLock<Rule>; 6] = [const { OnceLock::new() }; 6];
         RULES[shape as usize].get_or_init(|| {
@@ -223,8 +224,7 @@ impl Rule {
 mod tests {
     use super::*;
 
-    /// N is 1 at its own node and 0 at the others, all add up to 1, and gradients are those of finite
-    /// differences.
+    /// N is 1 at its own node and 0 at the others, the sum is 1, and gradients agree with finite differences.
     #[test]
     fn shape_functions_belong_to_their_nodes() {
         for shape in Shape::ALL {

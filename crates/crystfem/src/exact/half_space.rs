@@ -1,4 +1,4 @@
-//! Half spaces: a surface held, a surface with film, two in contact.
+//! Half spaces: with a held surface, with a film, two in contact.
 
 use super::erfcx;
 
@@ -19,20 +19,21 @@ impl HalfSpace {
         self.conductivity / self.diffusivity.sqrt()
     }
 
-    /// T = T_s + (T_i − T_s) erf(x/2√(αt)), K, with the surface held at `surface` from t = 0 on (Carslaw &
-    /// Jaeger, 2.4). `surface` at depth 0 and the initial temperature elsewhere at t = 0.
+    /// Returns T, K, with the surface held at `surface` from t = 0: T_s + (T_i − T_s) erf(x/2√(αt)) (Carslaw
+    /// & Jaeger, 2.4). At t = 0 it is `surface` at depth 0 and the initial temperature elsewhere.
     pub fn held(&self, surface: f64, depth: f64, time: f64) -> f64 {
         surface + (self.initial - surface) * libm::erf(self.similarity(depth, time))
     }
 
-    /// Heat through the held surface out of the body, q = k (T_i − T_s)/√(παt), W/m²; infinite at t = 0.
+    /// Heat flux out through the held surface, q = k (T_i − T_s)/√(παt), W/m²; infinite at t = 0.
     pub fn held_flux(&self, surface: f64, time: f64) -> f64 {
         self.conductivity * (self.initial - surface) / (std::f64::consts::PI * self.diffusivity * time).sqrt()
     }
 
-    /// T under a film of coefficient `film`, W/(m² K), with `ambient` beyond it, K: (T − T_i)/(T_a − T_i) =
-    /// erfc η − e^{hx/k + h²αt/k²} erfc(η + h√(αt)/k), η = x/2√(αt) (Carslaw & Jaeger, 2.7). The product is
-    /// e^{−η²} erfcx(η + h√(αt)/k), which neither overflows nor cancels, for any h from 0 to infinity.
+    /// Returns T, K, under a film of coefficient `film`, W/(m² K), to `ambient`, K (Carslaw & Jaeger, 2.7):
+    /// (T − T_i)/(T_a − T_i) = erfc η − e^{hx/k + h²αt/k²} erfc(η + h√(αt)/k), η = x/2√(αt).
+    /// The product is computed as e^{−η²} erfcx(η + h√(αt)/k), which neither overflows nor cancels for any h
+    /// from 0 to infinity.
     pub fn film(&self, film: f64, ambient: f64, depth: f64, time: f64) -> f64 {
         if film.is_infinite() {
             return self.held(ambient, depth, time);
@@ -51,7 +52,7 @@ impl HalfSpace {
     }
 }
 
-/// θ = erfc η − e^{−η²} erfcx(η + β) with β = h√(αt)/k: 0 untouched, 1 at ambient temperature.
+/// θ = erfc η − e^{−η²} erfcx(η + β) with β = h√(αt)/k: 0 at the initial, 1 at the ambient temperature.
 pub(super) fn film_share(similarity: f64, film: f64) -> f64 {
     if similarity.is_infinite() || film == 0.0 {
         return 0.0;
@@ -59,24 +60,24 @@ pub(super) fn film_share(similarity: f64, film: f64) -> f64 {
     (-similarity * similarity).exp() * (erfcx(similarity) - erfcx(similarity + film))
 }
 
-/// Two half spaces brought into perfect contact: a layer printed on glass, in its first moments.
+/// Two half spaces in perfect contact from t = 0: a layer just printed on glass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
-    /// The body at negative places.
+    /// Body at x < 0.
     pub lower: HalfSpace,
-    /// The body at positive places.
+    /// Body at x > 0.
     pub upper: HalfSpace,
 }
 
 impl Contact {
-    /// Temperature of the contact, constant in time: (e₁T₁ + e₂T₂)/(e₁ + e₂), K (Carslaw & Jaeger, 2.15).
+    /// Contact temperature, constant in time: (e₁T₁ + e₂T₂)/(e₁ + e₂), K (Carslaw & Jaeger, 2.15).
     pub fn temperature_of_contact(&self) -> f64 {
         let [lower, upper] = [self.lower, self.upper].map(|body| body.effusivity());
         (lower * self.lower.initial + upper * self.upper.initial) / (lower + upper)
     }
 
-    /// T at `place` (m, negative in the lower body), K: each body is one with its surface held at the
-    /// contact's.
+    /// Returns T at `place` (m, negative in the lower body), K: each body has its surface held at the contact
+    /// temperature.
     pub fn temperature(&self, place: f64, time: f64) -> f64 {
         let body = if place < 0.0 { self.lower } else { self.upper };
         body.held(self.temperature_of_contact(), place.abs(), time)

@@ -6,13 +6,13 @@ use crate::error::Error;
 use crate::kinetics;
 use std::f64::consts::LN_2;
 
-/// Fits α = 1 − exp(−k tⁿ), Eq. (4.2), to times, s, from the begin of crystallization, and α.
+/// Fits α = 1 − exp(−k tⁿ), Eq. (4.2), to times, s, from the start of crystallization, and α.
 ///
 /// Estimates: `half_time` t_½ in s, `avrami_exponent` n, `rate_constant` k = ln 2/t_½ⁿ in s⁻ⁿ.
 ///
 /// # Errors
-/// [`Error::Data`] for columns of different lengths, times that are negative, α outside [`super::DEGREES`],
-/// NaN, too few measurements or constant ones, and data that do not determine both constants.
+/// [`Error::Data`] for columns of different lengths, negative times, α outside [`super::DEGREES`], NaN, too
+/// few or constant measurements, and data that do not determine both constants.
 pub fn avrami(times: &[f64], degrees: &[f64]) -> Result<Fit, Error> {
     let what = "fit of Avrami's law";
     if times.len() != degrees.len() {

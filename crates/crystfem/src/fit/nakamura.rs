@@ -1,4 +1,4 @@
-//! Nakamura's theory with the rate of Hoffman and Lauritzen, from any temperature histories.
+//! Nakamura's theory with the rate of Hoffman and Lauritzen, fitted to any temperature histories.
 
 use super::least_squares::{STEP, minimize};
 use super::{Estimate, Fit, check, check_finite};
@@ -6,10 +6,10 @@ use crate::error::Error;
 use crate::kinetics::{Constants, GAS_CONSTANT, Kinetics};
 use std::f64::consts::LN_2;
 
-/// Steps of temperature, K, in which K is integrated: the error in α is below 1e-7.
+/// Temperature step, K, for the integration of K: the error in α is below 1e-7.
 const PART: f64 = 1.0;
 
-/// What is not fitted.
+/// Constants that are not fitted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Known {
     /// Equilibrium melting temperature T₀, K.
@@ -25,16 +25,16 @@ pub struct Known {
 pub struct Run {
     /// Times, s, increasing.
     pub times: Vec<f64>,
-    /// Temperatures, K; linear between.
+    /// Temperatures, K, linear in between.
     pub temperatures: Vec<f64>,
-    /// α there.
+    /// Measured α.
     pub degrees: Vec<f64>,
-    /// The history before the first measurement: times, s, increasing, and temperatures, K; linear between.
+    /// History before the first measurement: times, s, increasing, and temperatures, K, linear in between.
     pub history: Vec<[f64; 2]>,
 }
 
 impl Run {
-    /// At a constant cooling rate, K/s, from T₀ on.
+    /// Returns a measurement at a constant cooling rate, K/s, from T₀.
     ///
     /// # Errors
     /// [`Error::Data`] unless the rate is above 0 and the temperatures, K, fall from T₀ or below.
@@ -116,9 +116,8 @@ impl Run {
 /// Estimates: `growth_rate` K₀ in 1/s, `nucleation` K_G in K², `avrami_exponent` n.
 ///
 /// # Errors
-/// [`Error::Data`] for what [`avrami`](super::avrami) refuses too, times that decrease, and data that do not
-/// determine all three (one isothermal run, say); [`Error::Parameter`] for known constants out of their
-/// domain.
+/// [`Error::Data`] as for [`avrami`](super::avrami), for times that decrease, and data that do not determine
+/// all three (one isothermal run, for example); [`Error::Parameter`] for known constants out of their domain.
 pub fn nakamura(runs: &[Run], known: &Known) -> Result<Fit, Error> {
     let what = "fit of Nakamura's and Hoffman–Lauritzen's constants";
     for run in runs {
@@ -192,7 +191,7 @@ pub fn nakamura(runs: &[Run], known: &Known) -> Result<Fit, Error> {
     })
 }
 
-/// The mean temperature of what is neither melt nor done.
+/// Returns the mean temperature of measurements with 0.01 ≤ α ≤ 0.99 between T∞ and T₀.
 fn middle(runs: &[Run], known: &Known) -> Option<f64> {
     let (mut sum, mut count) = (0.0, 0.0);
     for run in runs {

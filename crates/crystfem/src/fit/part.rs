@@ -1,23 +1,23 @@
-//! Constants of the kinetics from curves that were measured in a part: the model is a whole simulation.
+//! Fit of kinetic constants to curves measured in a part; the model is a whole simulation.
 
 use super::least_squares::minimize;
 use super::{Estimate, Fit, check};
 use crate::error::Error;
 use crate::kinetics::{Constants, GAS_CONSTANT};
 
-/// Step of differences of ln K and ln K_G: well above what adaptive time steps do to α.
+/// Difference step of ln K and ln K_G: well above the effect of adaptive time steps on α.
 const STEP: f64 = 1e-3;
 
-/// Temperature, K, and α at each measurement, with such constants; `None` where a simulation fails.
+/// Temperature, K, and α at each measurement for given constants; `None` if a simulation fails.
 pub type Model<'a> = dyn Fn(&Constants) -> Option<Vec<[f64; 2]>> + 'a;
 
-/// Fits K₀ and K_G of Eqs (4.6) and (4.7) from the constants `start`, whose other values are kept.
+/// Fits K₀ and K_G of Eqs (4.6) and (4.7), starting from `start`; its other constants are kept.
 ///
 /// Estimates: `growth_rate` K₀ in 1/s, `nucleation` K_G in K².
 ///
 /// # Errors
-/// [`Error::Data`] for what [`avrami`](super::avrami) refuses too, a model that fails at `start`, a part that
-/// does not crystallize there, and curves that do not determine both constants (of one temperature, say).
+/// [`Error::Data`] as for [`avrami`](super::avrami), for a model that fails or does not crystallize at
+/// `start`, and curves that do not determine both constants (of a single temperature, for example).
 pub fn part(model: &Model, degrees: &[f64], start: &Constants) -> Result<Fit, Error> {
     let what = "fit of a part";
     let refuse = |reason: &str| Error::Data { what: what.to_owned(), reason: reason.to_owned() };

@@ -54,7 +54,8 @@ fn runs(noise: Option<(&mut Noise, f64)>) -> Vec<Run> {
     runs
 }
 
-/// Without noise the constants come back; Gauss' rule on steps of 0.75 K and from T₀ carries 1e-6.
+/// Recovers the constants from data without noise; Gauss' rule on steps of 0.75 K and from T₀ contributes
+/// 1e-6.
 #[test]
 fn nakamura_comes_back() {
     let fit = nakamura(&runs(None), &KNOWN).unwrap();
@@ -79,7 +80,8 @@ fn avrami_comes_back() {
     }
 }
 
-/// By Nakamura's theory Ozawa's exponent is n and χ(T) = (∫K dT)ⁿ; linear interpolation between exact rows.
+/// Recovers Ozawa's exponent n and χ(T) = (∫K dT)ⁿ of Nakamura's theory from exact rows, interpolated
+/// linearly.
 #[test]
 fn ozawa_comes_back() {
     let mut coolings = coolings(&[5.0, 7.0, 10.0, 14.0]);
@@ -98,7 +100,7 @@ fn ozawa_comes_back() {
     assert!(error.contains("0 rates with alpha") && error.contains("at least 3"), "{error}");
 }
 
-/// How often the 95 % intervals hold the true values.
+/// Returns the frequency with which 95 % intervals contain the true values.
 fn coverage(count: u64, truth: &[(&str, f64)], fit: impl Fn(&mut Noise) -> Fit) -> Vec<f64> {
     let mut held = vec![0.0; truth.len()];
     for seed in 0..count {
@@ -133,7 +135,8 @@ fn intervals_of_nakamura_hold_the_true_value_as_often_as_they_say() {
     assert!(held.iter().all(|share| (share - 0.95).abs() < 0.045), "{held:?}");
 }
 
-/// As above; few rates make the quantile of Student's distribution matter (four degrees of freedom).
+/// 95 % intervals at few rates, where the quantile of Student's distribution matters (four degrees of
+/// freedom).
 #[test]
 fn intervals_of_ozawa_hold_the_true_value_as_often_as_they_say() {
     let truth = [("ozawa_exponent", 2.678)];
@@ -206,12 +209,12 @@ fn degenerate_data_have_named_errors() {
     assert!(ozawa(&same, 426.0).is_err());
 }
 
-/// What grew while the sample was held, before the first measurement, belongs to the history.
+/// Growth during a hold before the first measurement is part of the history.
 #[test]
 fn a_hold_before_the_measurements_counts() {
     let mut held = runs(None);
     for run in &mut held {
-        // a kelvin above the first measurement, until z is 0.3 larger
+        // a hold one kelvin above the first measurement, until z is 0.3 larger
         let temperature = run.temperatures[0] + 1.0;
         let reached =
             run.times[0] - (run.times[1] - run.times[0]) / (run.temperatures[0] - run.temperatures[1]);
@@ -229,7 +232,7 @@ fn a_hold_before_the_measurements_counts() {
 }
 
 proptest::proptest! {
-    /// Whatever is given, a fit ends with finite estimates or with an error.
+    /// A fit ends with finite estimates or an error for any input.
     #[test]
     fn never_panics(times in proptest::collection::vec(proptest::num::f64::ANY, 0..12),
                     degrees in proptest::collection::vec(-0.3..1.3_f64, 0..12)) {
@@ -244,9 +247,9 @@ proptest::proptest! {
     }
 }
 
-/// What a fit predicts beyond its data, the temperature at α = ½ on cooling at 40 K/min, is as uncertain as
-/// its draws say: its spread over repeated measurements is that of the draws, and their 95 % bands hold the
-/// true value as often as they should.
+/// Draws predict the scatter of repeated measurements: for a prediction beyond the data, the temperature at α
+/// = ½ on cooling at 40 K/min, the spread over repeated measurements is that of the draws, and their 95 %
+/// bands contain the true value in 95 % of cases.
 #[test]
 fn draws_predict_what_repeated_measurements_give() {
     let half = |kinetics: &Kinetics| {

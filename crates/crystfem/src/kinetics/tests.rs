@@ -6,7 +6,7 @@ fn columns() -> [Kinetics; 2] {
 
 const ZERO: f64 = 273.15;
 
-/// formulation.md, "Kinetics": peak, α = 0.01, 0.5, 0.99 in °C, by column and K/min; ±0.02 K as issue 4 asks.
+/// formulation.md, "Kinetics": peak, α = 0.01, 0.5, 0.99 in °C, by column and K/min; ±0.02 K.
 #[test]
 fn kinetics_table() {
     let table = [
@@ -96,7 +96,7 @@ fn quench() {
     }
 }
 
-/// The largest error in α at 10 K/min from a seed of 1e-3, column 1, 200 → 120 °C.
+/// Returns the largest error in α at 10 K/min from a seed of 1e-3, column 1, 200 → 120 °C.
 fn error_of(scheme: Scheme, step: f64) -> f64 {
     let kinetics = columns()[0];
     let rate = 10.0 / 60.0;
@@ -161,7 +161,7 @@ fn euler_leaves_its_bounds_at_a_hold() {
     evidence::within("K Δt from which Euler leaves [0, 1] at a hold", first, 0.040, 0.046);
 }
 
-/// Orders of accuracy where all is smooth: 1, 4, 2 and 4.
+/// Orders of accuracy on smooth data: 1, 4, 2 and 4.
 #[test]
 fn orders() {
     let kinetics = columns()[0];
@@ -200,7 +200,7 @@ fn a_hold_is_avrami() {
     }
 }
 
-/// The defined limits of K: 0 outside (T∞, T₀), never infinite, smooth into both ends.
+/// Limits of K: 0 outside (T∞, T₀), never infinite, smooth at both ends.
 #[test]
 fn rate_vanishes_outside_the_window() {
     for kinetics in columns() {
@@ -220,7 +220,7 @@ fn rate_vanishes_outside_the_window() {
     }
 }
 
-/// There and back without loss at both ends.
+/// Round trips keep digits at both ends.
 #[test]
 fn conversions_keep_digits() {
     let kinetics = columns()[0];
@@ -235,7 +235,7 @@ fn conversions_keep_digits() {
     assert_eq!((kinetics.z_of_degree(1.0), kinetics.degree(1e30)), (1e30, 1.0));
 }
 
-/// The growth over any increment is ∫K dT · Δt/ΔT, by a rule of five points; bound: the error of one panel.
+/// Growth over any increment is ∫K dT · Δt/ΔT, by a five-point rule; bound: the error of one panel.
 #[test]
 fn growth_is_the_integral() {
     for kinetics in columns() {
@@ -252,8 +252,8 @@ fn growth_is_the_integral() {
 }
 
 proptest::proptest! {
-    /// Finite, not negative, at most K_max Δt; its derivative is that of finite differences; continuous in
-    /// the end.
+    /// Growth is finite, not negative, at most K_max Δt, and continuous in the end temperature; its
+    /// derivative agrees with finite differences.
     #[test]
     fn growth_over_any_increment(
         start in 73.15..1273.15_f64, change in -1200.0..1200.0_f64, scale in 0..7_i32, dt in -3.0..9.0_f64,
@@ -265,7 +265,8 @@ proptest::proptest! {
         proptest::prop_assert!(growth.z >= 0.0 && growth.slope.is_finite());
         let most = kinetics.fastest()[1] * dt;
         proptest::prop_assert!(growth.z <= most * (1.0 + 1e-12));
-        // 1e-4 K of the end; the rule's kinks at the borders of panels stay below 1e-3 of the greatest slope
+        // within 1e-4 K of the end; the kinks of the rule at panel borders stay below 1e-3 of the largest
+        // slope
         let at = |end: f64| kinetics.growth(start, end, dt).z;
         let h = 1e-4;
         if (end - start).abs() > 1e-2 {
@@ -275,7 +276,7 @@ proptest::proptest! {
         }
     }
 
-    /// Panels join without gap and their shares sum to 1.
+    /// Panels join without gaps and their shares sum to 1.
     #[test]
     fn panels_join(start in 73.15..1273.15_f64, end in 73.15..1273.15_f64, count in 1..200_usize) {
         let kinetics = columns()[0];

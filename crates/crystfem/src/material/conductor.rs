@@ -4,8 +4,8 @@ use super::{Point, Property, Response, ThermalMaterial};
 use crate::error::Error;
 use nalgebra::{Matrix3, Vector3};
 
-/// A conductor without state: U = ∫c dT, f = −k(T) D ∇T, D diagonal: along beads a part conducts better than
-/// across.
+/// A conductor without state: U = ∫c dT, f = −k(T) D ∇T, with diagonal D: a part conducts better along its
+/// beads.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Conductor {
     density: f64,
@@ -16,7 +16,7 @@ pub struct Conductor {
 }
 
 impl Conductor {
-    /// From density, kg/m³, conductivity, W/(m K), and specific heat, J/(kg K).
+    /// Returns a conductor of density, kg/m³, conductivity, W/(m K), and specific heat, J/(kg K).
     ///
     /// # Errors
     /// [`Error::Parameter`] unless the density is above 0 and finite.
@@ -28,7 +28,7 @@ impl Conductor {
         Err(Error::Parameter { name: "density, kg/m³", found: density, allowed })
     }
 
-    /// The same with factors on the conductivity along x, y and z.
+    /// Scales the conductivity along x, y and z.
     ///
     /// # Errors
     /// [`Error::Parameter`] unless each is above 0 and finite.
@@ -58,7 +58,7 @@ impl Conductor {
         self.conductivity.is_constant() && self.specific_heat.is_constant()
     }
 
-    /// The response without any state.
+    /// Computes the response.
     pub(super) fn conduct(&self, at: &Point) -> Result<Response, Error> {
         let temperature = at.check()?;
         let [conductivity, slope] = self.conductivity.with_slope(temperature);
@@ -75,7 +75,7 @@ impl Conductor {
 }
 
 impl Point {
-    /// The temperature at the end of the increment, K, where it is one.
+    /// Returns the temperature at the end of the increment, K, if valid.
     ///
     /// # Errors
     /// [`Error::Parameter`] for temperatures that are not finite and a Δt that is not finite or below 0.

@@ -1,24 +1,23 @@
-//! Growth and melting of crystals over an increment, at one point.
+//! Growth and melting of crystals at a point, over an increment.
 
 use crate::kinetics::{Extent, Kinetics, PANELS, Panels};
 use crate::melting::Melting;
 
-/// Panels of (T∞, T₀) on heating, where growth and melting alternate; PA12: 1.35 K.
+/// Number of panels of (T∞, T₀) on heating, where growth and melting alternate; 1.35 K each for PA12.
 pub(super) const HEATING_PANELS: usize = 4 * PANELS;
 
-/// A melting below this part of the crystals is none.
+/// ln of the melted fraction's complement above which melting is negligible.
 pub(super) const NOTHING: f64 = -1e-17;
 
-/// Fewer crystals are none: quotients of smaller numbers overflow.
+/// Smallest z that can melt: quotients of smaller numbers overflow.
 pub(super) const FAINT: f64 = 1e-280;
 
-/// Kinetics and melting together: dz/dt = K(T) at every temperature, and on heating α falls in proportion to
-/// 1 − X_m(T).
+/// Kinetics and melting: dz/dt = K(T) at every temperature; on heating α falls in proportion to 1 − X_m(T).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crystallization {
     /// Growth.
     pub kinetics: Kinetics,
-    /// Melting; without it crystals never melt.
+    /// Melting; `None` if crystals never melt.
     pub melting: Option<Melting>,
 }
 
@@ -32,12 +31,12 @@ pub struct Grown {
 }
 
 impl Crystallization {
-    /// From z at the start over an increment in which the temperature runs linearly from `start` to `end`, K,
-    /// in the time `dt`, s.
+    /// Advances z over an increment with the temperature linear from `start` to `end`, K, in the time `dt`,
+    /// s.
     ///
     /// On cooling and at a hold z grows by ∫K dt. On heating each panel of temperature takes half of its
-    /// growth, then α ← α (1−X_m(T₂))/(1−X_m(T₁)), then the other half: z and α stay within their bounds
-    /// whatever the increment, and the end is a continuous function of its temperature.
+    /// growth, then α ← α (1−X_m(T₂))/(1−X_m(T₁)), then the other half: z and α stay within their bounds for
+    /// any increment, and the result is a continuous function of the end temperature.
     pub fn advance(&self, z: f64, start: f64, end: f64, dt: f64) -> Grown {
         let kinetics = &self.kinetics;
         let melting = match &self.melting {
@@ -52,7 +51,7 @@ impl Crystallization {
             return grown;
         }
         let [mut before, _] = melting.survival(start);
-        // in a jump nothing grows, and what melts is the product of all parts
+        // no growth in a jump, and the melting of all panels is their product
         let panels = if dt == 0.0 { 1 } else { HEATING_PANELS };
         for panel in Panels::new(kinetics, start, end, panels) {
             let growth = kinetics.growth_over(&panel, dt);
@@ -67,7 +66,7 @@ impl Crystallization {
         grown
     }
 
-    /// α ← α e^L. Near α = 1 through 1 − α, so that no digit is lost on the way there and back.
+    /// Melts α ← α e^L, near α = 1 through 1 − α, so that no digits are lost.
     pub(super) fn melt(&self, grown: Grown, logarithm: f64, slope: f64) -> Grown {
         let kinetics = &self.kinetics;
         let Grown { z, slope: z_slope } = grown;
@@ -95,7 +94,7 @@ mod tests {
     use super::*;
     use crate::kinetics::Constants;
 
-    /// A jump to a temperature passes all those before it.
+    /// A jump equals the sequence of smaller jumps.
     #[test]
     fn jumps_follow_each_other() {
         let kinetics = Kinetics::new(Constants::TABLE_4_1_COLUMN_1).unwrap();

@@ -2,18 +2,18 @@
 
 use crate::error::Error;
 
-/// Temperature at which energies are counted from, K: U(T_ref) = 0 for amorphous material.
+/// Reference temperature of energies, K: U(T_ref) = 0 for amorphous material.
 pub const REFERENCE_TEMPERATURE: f64 = 273.15;
 
-/// Relative change within 1 K above which a property jumps.
+/// Relative change within 1 K above which a property counts as a jump.
 const STEEPEST: f64 = 0.1;
 
-/// A positive property of temperature.
+/// A positive, temperature-dependent property.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Property {
-    /// The same at every temperature.
+    /// A constant.
     Constant(f64),
-    /// Linear between given values, constant beyond the ends.
+    /// Linear between given values, constant outside.
     Table(Table),
 }
 
@@ -22,16 +22,16 @@ pub enum Property {
 pub struct Table {
     temperatures: Vec<f64>,
     values: Vec<f64>,
-    /// ∫ from the first temperature to each.
+    /// Integrals from the first temperature to each.
     integrals: Vec<f64>,
-    /// ∫ from the first temperature to the reference.
+    /// Integral from the first temperature to the reference.
     offset: f64,
-    /// See [`Property::jumps`].
+    /// Steep change, see [`Property::jumps`].
     jumps: bool,
 }
 
 impl Property {
-    /// A constant; `name` is for the error.
+    /// Returns a constant; `name` is for the error.
     ///
     /// # Errors
     /// [`Error::Parameter`] unless it is above 0 and finite.
@@ -40,11 +40,11 @@ impl Property {
         Ok(Self::Constant(value))
     }
 
-    /// A table of temperatures, K, and values.
+    /// Returns a table of temperatures, K, and values.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for no rows or unequal columns (with the number of rows), temperatures that do
-    /// not increase, and values that are not above 0 and finite.
+    /// [`Error::Parameter`] for no rows or columns of different lengths (with the number of rows),
+    /// temperatures that do not increase, and values that are not above 0 and finite.
     pub fn table(name: &'static str, temperatures: Vec<f64>, values: Vec<f64>) -> Result<Self, Error> {
         let refuse = |name, found, allowed: String| Err(Error::Parameter { name, found, allowed });
         if temperatures.is_empty() || temperatures.len() != values.len() {
@@ -76,13 +76,13 @@ impl Property {
         Ok(Self::Table(table))
     }
 
-    /// The value at a temperature.
+    /// Returns the value at a temperature, K.
     #[inline]
     pub fn at(&self, temperature: f64) -> f64 {
         self.with_slope(temperature)[0]
     }
 
-    /// The value and its derivative (at a point of a table the one to the right).
+    /// Returns the value and its derivative (the right one at a table row).
     #[inline]
     pub fn with_slope(&self, temperature: f64) -> [f64; 2] {
         match self {
@@ -91,7 +91,7 @@ impl Property {
         }
     }
 
-    /// The integral from [`REFERENCE_TEMPERATURE`] to a temperature, exact for a table too.
+    /// Integrates from [`REFERENCE_TEMPERATURE`] to a temperature, exactly for a table too.
     #[inline]
     pub fn integral(&self, temperature: f64) -> f64 {
         match self {
@@ -100,12 +100,12 @@ impl Property {
         }
     }
 
-    /// Returns whether it changes by more than a tenth of itself within 1 K somewhere.
+    /// Returns true if it changes by more than a tenth within 1 K somewhere.
     pub fn jumps(&self) -> bool {
         matches!(self, Self::Table(table) if table.jumps)
     }
 
-    /// Returns whether it is the same everywhere.
+    /// Returns true for a constant.
     pub fn is_constant(&self) -> bool {
         match self {
             Self::Constant(_) => true,
@@ -115,12 +115,12 @@ impl Property {
 }
 
 impl Table {
-    /// Temperatures, K, and values.
+    /// Rows of temperature, K, and value.
     pub fn rows(&self) -> impl Iterator<Item = [f64; 2]> {
         self.temperatures.iter().zip(&self.values).map(|(&temperature, &value)| [temperature, value])
     }
 
-    /// The row at or before a temperature within the table.
+    /// Index of the row at or before a temperature within the table.
     fn row(&self, temperature: f64) -> usize {
         self.temperatures.partition_point(|&t| t <= temperature) - 1
     }
@@ -138,7 +138,7 @@ impl Table {
         [self.values[i] + slope * (temperature - self.temperatures[i]), slope]
     }
 
-    /// From the first temperature.
+    /// Integrates from the first temperature.
     fn integral(&self, temperature: f64) -> f64 {
         let last = self.values.len() - 1;
         if temperature < self.temperatures[0] {

@@ -1,9 +1,9 @@
 //! Growth and melting of crystals at many points of one law.
 //!
-//! Points at one node have one temperature history, whatever their z. What depends on that alone is computed
-//! once for each node: growth Δz, and on heating ln (1−X_m(T₂))/(1−X_m(T₁)), by which crystals become less.
-//! Both, and the melting of each point, are loops of vectors. Increments that cross borders of panels are cut
-//! there into pieces, which points pass one after another.
+//! Points at one node share one temperature history, for any z. Quantities that depend on the history alone
+//! are computed once a node: growth Δz, and on heating the fall ln (1−X_m(T₂))/(1−X_m(T₁)), by which crystals
+//! decrease. These, and the melting of each point, are vectorized loops. Increments that cross panel borders
+//! are cut there into pieces, which are passed one after another.
 
 use super::Crystallization;
 use super::crystallization::{FAINT, Grown, HEATING_PANELS, NOTHING};
@@ -12,12 +12,14 @@ use crate::kinetics::{PANELS, Panels};
 use crate::simd_math::{SMALL, exp, expm1_small, ln, ln_1p};
 use pulp::{Arch, Simd, WithSimd};
 
-/// z at least for powers of it; zⁿ at most for its exponential, and the logarithm of that.
+/// Smallest z for powers.
 const LEAST_Z: f64 = 1e-20;
+/// Largest zⁿ for its exponential.
 const MOST_POWER: f64 = 700.0;
+/// Logarithm of [`MOST_POWER`].
 const MOST_LOGARITHM: f64 = 6.5;
 
-/// Increments of temperature of nodes, in one time.
+/// Increments of temperature at nodes, all over the same time.
 #[derive(Clone, Copy)]
 pub(crate) struct Increments<'a> {
     /// Temperatures at the start, K.
@@ -28,19 +30,19 @@ pub(crate) struct Increments<'a> {
     pub dt: f64,
 }
 
-/// Room for one work item.
+/// Buffers for one work item.
 #[derive(Default)]
 pub(crate) struct Scratch {
-    /// Δz of each node, NaN where it heats in pieces.
+    /// Δz of each node; NaN for nodes that heat in pieces.
     growth: Vec<f64>,
-    /// ln (1−X_m(T₂))/(1−X_m(T₁)) of each node; 0 for none.
+    /// ln (1−X_m(T₂))/(1−X_m(T₁)) of each node; 0 without melting.
     fall: Vec<f64>,
-    /// First and last piece of each node that has them; a node whose increment is not finite has none.
+    /// First and last piece of each node with pieces; none if the increment is not finite.
     pieces: Vec<[u32; 2]>,
-    /// Pieces: temperatures at their ends, part of the time, growth and fall.
+    /// Pieces: temperatures at their ends, fraction of the time, growth and fall.
     piece: Pieces,
     queue: Queue,
-    /// Points in nodes that heat in pieces, and their z before.
+    /// Points of nodes that heat in pieces, and their initial z.
     long: Vec<(u32, f64)>,
     seen: Seen,
 }
@@ -55,9 +57,9 @@ struct Pieces {
 }
 
 impl Crystallization {
-    /// z of points over an increment, as [`Self::advance`] does; `node` is that of each point. Returns the
-    /// wish for the next step over this one: [`LARGEST_CHANGE`] over the largest change of α, if there is
-    /// any. z becomes NaN where an increment is not finite.
+    /// Advances z of points over an increment, like [`Self::advance`]; `node` is the node of each point.
+    /// Returns the requested ratio of next to present step: [`LARGEST_CHANGE`] over the largest change of α,
+    /// if there is any. z becomes NaN if an increment is not finite.
     pub(crate) fn advance_all(
         &self,
         increments: Increments,
@@ -106,7 +108,7 @@ impl Crystallization {
         seen.requested_ratio(self)
     }
 
-    /// Growth and fall of all nodes and pieces.
+    /// Computes growth and fall of all nodes and pieces.
     fn histories(&self, increments: Increments, scratch: &mut Scratch) {
         let Scratch { growth, fall, pieces, piece, .. } = scratch;
         let Increments { start, end, dt } = increments;
@@ -135,7 +137,7 @@ impl Crystallization {
         falls.resize(from.len(), 0.0);
         arch.dispatch(Histories { law: self, start: from, end: to, dt: None, growth: parts, fall: falls });
         parts.iter_mut().zip(share).for_each(|(growth, share)| *growth *= *share * dt);
-        // without melting pieces add up
+        // without melting the growth of pieces adds up
         for k in 0..size {
             let [first, last] = pieces[k];
             if first < last && !melts(k) {
@@ -146,7 +148,7 @@ impl Crystallization {
     }
 }
 
-/// Points in which crystals melt: point, z, Δz and fall of each.
+/// Queue of points whose crystals melt: point, z, Δz and fall of each.
 #[derive(Default)]
 struct Queue {
     points: Vec<u32>,
@@ -156,7 +158,7 @@ struct Queue {
 }
 
 impl Queue {
-    /// z after an increment within one panel, or `None`: it waits for [`Self::take`].
+    /// Returns z after an increment within one panel, or `None` if queued until [`Self::take`].
     #[inline]
     fn offer(&mut self, law: &Crystallization, point: u32, z: f64, growth: f64, fall: f64) -> Option<f64> {
         if fall == 0.0 {
@@ -173,7 +175,7 @@ impl Queue {
         None
     }
 
-    /// Hands out all z that wait.
+    /// Melts the queued points and hands out their z.
     fn take(&mut self, law: &Crystallization, mut to: impl FnMut(u32, f64)) {
         let Self { points, z, growth, fall } = self;
         let exponent = law.kinetics.constants().avrami_exponent;
@@ -184,12 +186,12 @@ impl Queue {
     }
 }
 
-/// Changes of α.
+/// Changes of α, for the step suggestion.
 #[derive(Default)]
 struct Seen {
-    /// Some change that asks for no shorter step than the longest.
+    /// True once a change is too small to limit the step.
     small: bool,
-    /// z before and after, where α changes much.
+    /// z before and after large changes of α.
     before: Vec<f64>,
     after: Vec<f64>,
 }
@@ -201,7 +203,7 @@ impl Seen {
         self.after.clear();
     }
 
-    /// |∂α/∂z| ≤ n: most changes need no look at α.
+    /// Records a change; |∂α/∂z| ≤ n bounds most without evaluating α.
     #[inline]
     fn see(&mut self, law: &Crystallization, before: f64, after: f64) {
         if after == before {
@@ -228,7 +230,7 @@ impl Seen {
     }
 }
 
-/// Growth and fall over increments: of nodes, NaN where borders of panels are crossed, or of pieces, in a
+/// Computes growth and fall over increments: of nodes (NaN if panel borders are crossed), or of pieces, per
 /// second.
 struct Histories<'a> {
     law: &'a Crystallization,
@@ -265,9 +267,9 @@ impl WithSimd for Histories<'_> {
     }
 }
 
-/// Half of the growth, α ← α e^L, the other half; z with half of its growth at least [`LEAST_Z`].
+/// Half of the growth, α ← α e^L, the other half; z with half of its growth is at least [`LEAST_Z`].
 ///
-/// With p = zⁿ and u = (1 − e^L)(eᵖ − 1), p becomes p − ln(1 + u), where that is near; else −ln(1 − α).
+/// With p = zⁿ and u = (1 − e^L)(eᵖ − 1), p becomes p − ln(1 + u) if close, otherwise −ln(1 − α).
 struct Melt<'a> {
     exponent: f64,
     z: &'a mut [f64],
@@ -287,7 +289,7 @@ impl WithSimd for Melt<'_> {
             let grown = z[k] + 0.5 * growth[k];
             let kept = exp(fall[k]);
             let lost = if fall[k] > -SMALL { -expm1_small(fall[k].max(-SMALL)) } else { 1.0 - kept };
-            // exp(n ln z) is off by 1e-14: so is what is small beside 1, not z
+            // exp(n ln z) has an error of 1e-14, and so have quantities small beside 1, but not z
             let power = exp(exponent * ln(grown)).min(MOST_POWER);
             let whole = exp(power);
             let above = if power < SMALL { expm1_small(power.min(SMALL)) } else { whole - 1.0 };
@@ -305,7 +307,7 @@ impl WithSimd for Melt<'_> {
     }
 }
 
-/// `before` becomes |α − α before|.
+/// Replaces `before` by |α − α before|.
 struct Changes<'a> {
     exponent: f64,
     before: &'a mut [f64],
@@ -325,7 +327,7 @@ impl WithSimd for Changes<'_> {
     }
 }
 
-/// 1 − α.
+/// Returns 1 − α.
 #[inline(always)]
 fn remainder(exponent: f64, z: f64) -> f64 {
     let held = z.clamp(LEAST_Z, MOST_POWER);

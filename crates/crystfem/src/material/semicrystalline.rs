@@ -1,17 +1,16 @@
-//! A semicrystalline polymer: Fourier's law, crystallization and melting, latent heat where it is given.
+//! A semicrystalline polymer: Fourier's law, crystallization and melting, optional latent heat.
 
 use super::{Conductor, Crystallization, Point, Property, Response, ThermalMaterial};
 use crate::error::Error;
 use crate::kinetics::{Constants, Kinetics};
 use crate::melting::Melting;
 
-/// A change of α in one increment at which the suggested step is the one taken.
+/// Change of α per increment at which the suggested step equals the present one.
 pub const LARGEST_CHANGE: f64 = 0.1;
-/// The largest suggested step over the one taken.
+/// Largest suggested ratio of next to present step.
 pub(super) const LONGEST: f64 = 10.0;
 
-/// Names of the constants of growth and melting as other programs list them, in the order of
-/// [`Polymer::growth_and_melting`].
+/// Names of the constants of growth and melting in exports, in the order of [`Polymer::growth_and_melting`].
 pub const CONSTANT_NAMES: [&str; 9] = [
     "growth_rate",
     "nucleation",
@@ -24,7 +23,7 @@ pub const CONSTANT_NAMES: [&str; 9] = [
     "melting_peak",
 ];
 
-/// What makes up a [`Semicrystalline`] material, SI.
+/// Constants of a [`Semicrystalline`] material, SI.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Polymer {
     /// Density ρ, kg/m³.
@@ -35,11 +34,11 @@ pub struct Polymer {
     pub specific_heat: Property,
     /// Kinetics of crystallization.
     pub kinetics: Kinetics,
-    /// Melting on heating; without it crystals never melt.
+    /// Melting on heating; `None` if crystals never melt.
     pub melting: Option<Melting>,
     /// Ultimate crystallinity X∞: the mass fraction of crystals at α = 1.
     pub ultimate_crystallinity: f64,
-    /// Heat of fusion of crystal ΔH, J/kg; without it temperature and crystallinity are uncoupled, as in the
+    /// Heat of fusion of the crystal ΔH, J/kg; `None` uncouples temperature from crystallinity, as in the
     /// thesis.
     pub latent_heat: Option<f64>,
     /// Relative crystallinity α of fresh material.
@@ -47,8 +46,8 @@ pub struct Polymer {
 }
 
 impl Polymer {
-    /// The constants of growth and melting, SI, by the names of [`CONSTANT_NAMES`]; 0, 0, 0 of crystals that
-    /// never melt.
+    /// Constants of growth and melting, SI, in the order of [`CONSTANT_NAMES`]; 0, 0, 0 if crystals never
+    /// melt.
     pub fn growth_and_melting(&self) -> [f64; 9] {
         let of = self.kinetics.constants();
         let [sharpness, shape, peak] = self.melting.map_or([0.0; 3], |melting| melting.constants());
@@ -66,7 +65,7 @@ impl Polymer {
     }
 }
 
-/// The material. Its state is z = \[−ln(1−α)\]^{1/n}; with latent heat U = ∫c dT − ΔH X∞ α.
+/// A semicrystalline material. Its state is z = \[−ln(1−α)\]^{1/n}; with latent heat U = ∫c dT − ΔH X∞ α.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Semicrystalline {
     conductor: Conductor,
@@ -78,11 +77,11 @@ pub struct Semicrystalline {
 }
 
 impl Semicrystalline {
-    /// From its parts.
+    /// Builds the material from its constants.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a density ≤ 0, X∞ outside (0, 1], ΔH < 0, a seed outside \[0, 1), and for
-    /// what is not finite.
+    /// [`Error::Parameter`] for a density ≤ 0, X∞ outside (0, 1], ΔH < 0, a seed outside \[0, 1), and values
+    /// that are not finite.
     pub fn new(polymer: Polymer) -> Result<Self, Error> {
         let Polymer { ultimate_crystallinity, latent_heat, seed, kinetics, melting, .. } = polymer;
         let check = |name, found: f64, good: bool, allowed: &str| {
@@ -112,7 +111,7 @@ impl Semicrystalline {
     /// 4.1, X∞ = 0.25, 209 J/g of crystal.
     ///
     /// # Errors
-    /// None: as [`Self::new`] for other constants.
+    /// Errors of [`Self::new`]; none for these constants.
     pub fn pa12() -> Result<Self, Error> {
         Self::new(Polymer {
             density: 1010.0,
@@ -126,7 +125,7 @@ impl Semicrystalline {
         })
     }
 
-    /// The same with factors on the conductivity along x, y and z.
+    /// Scales the conductivity along x, y and z.
     ///
     /// # Errors
     /// [`Error::Parameter`] unless each is above 0 and finite.
@@ -134,12 +133,12 @@ impl Semicrystalline {
         Ok(Self { conductor: self.conductor.with_directions(factors)?, ..self })
     }
 
-    /// Growth and melting.
+    /// Growth and melting of crystals.
     pub fn crystallization(&self) -> &Crystallization {
         &self.crystallization
     }
 
-    /// Kinetics.
+    /// Kinetics of crystallization.
     pub fn kinetics(&self) -> &Kinetics {
         &self.crystallization.kinetics
     }
@@ -162,7 +161,7 @@ impl ThermalMaterial for Semicrystalline {
         &["alpha", "crystallinity"]
     }
 
-    /// α and X = X∞ α.
+    /// Returns α and X = X∞ α.
     fn fields(&self, state: &[f64], fields: &mut [f64]) {
         fields[0] = self.kinetics().degree(state[0]);
         fields[1] = self.ultimate_crystallinity * fields[0];
@@ -202,7 +201,7 @@ impl ThermalMaterial for Semicrystalline {
         if grown.z == old[0] && self.latent.is_none() {
             return Ok(response);
         }
-        // |∂α/∂z| ≤ n: the wish is the longest step without looking at α
+        // |∂α/∂z| ≤ n: small growth suggests the longest step without evaluating α
         if self.latent.is_none()
             && grown.z < 1.0
             && kinetics.constants().avrami_exponent * (grown.z - old[0]).abs() <= LARGEST_CHANGE / LONGEST

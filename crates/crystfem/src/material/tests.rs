@@ -50,8 +50,8 @@ fn point(temperature: f64, increment: f64, dt: f64) -> Point {
     Point { temperature, increment, gradient: Vector3::new(100.0, -20.0, 3.0), dt }
 }
 
-/// Every law: tangents against finite differences, energy a function of temperature and state, the old state
-/// untouched.
+/// Tangents agree with finite differences, energy is a function of temperature and state, and the old state
+/// is unchanged.
 #[test]
 fn tangents() {
     for (law, material) in all().iter().enumerate() {
@@ -89,7 +89,7 @@ fn tangents() {
     }
 }
 
-/// D k ∇T; factors that are none are named.
+/// The flux is −D k ∇T; invalid factors are named.
 #[test]
 fn conductivity_along_axes() {
     let material = pa12(None).with_directions([2.0, 1.0, 1e-6]).unwrap();
@@ -102,7 +102,7 @@ fn conductivity_along_axes() {
     }
 }
 
-/// z and α of a material after a path of (temperature, duration).
+/// Returns z of a material after a path of (temperature, duration).
 fn follow(material: &dyn ThermalMaterial, start: f64, state: f64, path: &[(f64, f64)], steps: usize) -> f64 {
     let (mut at, mut state) = (start, state);
     for &(end, duration) in path {
@@ -126,7 +126,7 @@ fn melting_by_survival() {
     let full = kinetics.z_of_remainder(1e-12);
     let mut before = 1.0;
     for end in [400.0, 420.0, 440.0, 450.0, 455.0, 459.9, 460.0, 500.0, 1273.15] {
-        // in no time nothing grows
+        // no growth in zero time
         let exact = (Melting::PA12.survival(end)[0] - Melting::PA12.survival(300.0)[0]).exp();
         let [once, many] =
             [1, 500].map(|steps| kinetics.degree(follow(&material, 300.0, full, &[(end, 0.0)], steps)));
@@ -141,7 +141,7 @@ fn melting_by_survival() {
     assert!(at(459.9) < 1e-4 && (at(459.9) - at(460.0)).abs() < 1e-5);
 }
 
-/// One heating through the range where growth and melting overlap: steps of any size agree, at second order.
+/// Heating through the range where growth and melting overlap converges at second order in the step.
 #[test]
 fn splitting_of_growth_and_melting_converges() {
     let material = pa12(None);
@@ -155,7 +155,7 @@ fn splitting_of_growth_and_melting_converges() {
     }
 }
 
-/// A thousand times molten and crystallized: every cycle ends where the first did, to the last digits.
+/// A thousand cycles of melting and crystallization end where the first did, to the last digits.
 #[test]
 fn a_thousand_cycles_do_not_drift() {
     let material = pa12(Some(209e3));
@@ -179,7 +179,7 @@ fn latent_heat_is_in_the_energy() {
     let rise = (material.energy(400.0, &[0.0]) - material.energy(400.0, &[full])) / 2200.0;
     assert!((rise - 23.75).abs() < 1e-9, "{rise}");
     assert!(!material.is_linear() && pa12(None).is_linear());
-    // without latent heat the energy knows nothing of α
+    // without latent heat the energy does not depend on α
     assert_eq!(pa12(None).energy(400.0, &[full]), pa12(None).energy(400.0, &[0.0]));
 }
 
@@ -195,7 +195,7 @@ fn step_ratio_is_that_of_the_change_of_alpha() {
         [1.0, 1.0 + material.kinetics().growth(420.0, 420.0, 2.0).z].map(|z| material.kinetics().degree(z));
     let found = ratio(1.0, 2.0).unwrap();
     assert!((found - LARGEST_CHANGE / (after - before)).abs() < 1e-12, "{found}");
-    // also where a bound on the change is enough
+    // also if a bound on the change suffices
     let mut bounded = 0;
     for dt in [1e-3, 1e-2, 0.03, 0.1, 0.3, 1.0, 3.0] {
         let grown = material.kinetics().growth(420.0, 420.0, dt).z;
@@ -225,7 +225,7 @@ fn temperatures_that_are_none_are_refused() {
 }
 
 proptest::proptest! {
-    /// From any α, over any increment between −200 and 1000 °C in any time up to 1e9 s: finite, α in [0, 1].
+    /// α stays finite and in [0, 1] from any α, over any increment between −200 and 1000 °C in up to 1e9 s.
     #[test]
     fn bounded_and_finite(
         start in 73.15..1273.15_f64, end in 73.15..1273.15_f64, scale in 0..10_i32, dt in -9.0..9.0_f64,
@@ -249,7 +249,7 @@ proptest::proptest! {
         }
     }
 
-    /// Cooling at 1e-3 to 1e6 K/min in one step across the whole window: the α of exact quadrature.
+    /// One step across the whole window at 1e-3 to 1e6 K/min gives α of exact quadrature.
     #[test]
     fn one_step_across_the_window(rate in -3.0..6.0_f64, column in 0..2_usize) {
         let constants = [Constants::TABLE_4_1_COLUMN_1, Constants::TABLE_4_1_COLUMN_2][column];
@@ -266,7 +266,7 @@ proptest::proptest! {
 mod printed {
     use super::*;
 
-    /// α after each step of a ramp from 200 °C at 1 K per step, or another start.
+    /// Returns α after each step of a ramp.
     fn ramp(sign: Sign, guarded: bool, from: f64, to: f64, step: f64, dt: f64) -> Vec<f64> {
         let material = AsPublished::new(plain(), sign, guarded);
         let (mut state, mut alphas) = ([0.0], Vec::new());
@@ -341,7 +341,7 @@ mod printed {
     }
 }
 
-/// Crystals that melt away to nothing on strong heating leave finite tangents, at any step.
+/// Tangents stay finite when crystals melt completely on strong heating, at any step.
 #[test]
 fn tangents_are_finite_on_strong_heating() {
     let material = pa12(Some(209e3));

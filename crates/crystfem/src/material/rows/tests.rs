@@ -1,11 +1,11 @@
-//! Rows of points against single points.
+//! Rows of points agree with single points.
 
 use super::*;
 use crate::kinetics::{Constants, Kinetics};
 use crate::melting::Melting;
 
-/// Against [`Crystallization::advance`] and α point by point: cold, hot, long and short increments, z from
-/// none to long crystallized.
+/// Rows agree with [`Crystallization::advance`] and α point by point: cold, hot, long and short increments, z
+/// from 0 to fully crystallized.
 #[test]
 fn rows_are_points() {
     for (constants, melting) in [
@@ -55,7 +55,7 @@ fn rows_are_points() {
                 end[k]
             );
         }
-        // the wish of points of one z each
+        // the step suggestion, for points of one z each
         for (begin, finish) in [(420.0, 419.0), (400.0, 401.0), (300.0, 300.0), (440.0, 442.0)] {
             for before in states {
                 let increments = Increments { start: &[begin], end: &[finish], dt: 0.5 };
@@ -67,7 +67,7 @@ fn rows_are_points() {
                 assert!(
                     match (wish, exact) {
                         (Some(wish), Some(exact)) => (wish / exact - 1.0).abs() < 1e-12,
-                        // a change of one rounding, or none
+                        // a change of one rounding error, or zero
                         (wish, exact) => wish == exact || change < 1e-15,
                     },
                     "{begin} {before:e}: {wish:?} {exact:?}"
@@ -77,8 +77,8 @@ fn rows_are_points() {
     }
 }
 
-/// Increments that are not finite, after others in pieces and in a shorter item: z tells of them, and others
-/// do not notice.
+/// Increments that are not finite give NaN and leave other points unchanged, also after pieces and in a
+/// shorter item.
 #[test]
 fn increments_that_are_not_finite() {
     for melting in [Some(Melting::PA12), None] {
