@@ -1,5 +1,5 @@
-//! The material alone, at one point: under a given temperature history, or as a lumped body that exchanges
-//! heat with its surroundings or none.
+//! A material at one point: under a given temperature history, or as a lumped body that cools or is
+//! adiabatic.
 
 use crate::error::Error;
 use crate::history::{History, Segment};
@@ -12,36 +12,36 @@ mod root;
 
 pub use material_point::MaterialPoint;
 
-/// What drives the temperature.
+/// Source of the temperature.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Drive {
-    /// It is given.
+    /// Given history.
     Prescribed(History),
-    /// Newton's cooling: dU/dt = −c (T − T_a)/τ, c the heat capacity at the start; adiabatic without
+    /// Newton's cooling, dU/dt = −c (T − T_a)/τ, with the initial heat capacity c; adiabatic without
     /// exchange.
     Lumped {
-        /// Temperature at the start, K.
+        /// Initial temperature, K.
         start: f64,
         /// Temperature of the surroundings T_a, K, and time constant τ, s.
         exchange: Option<[f64; 2]>,
-        /// How long, s.
+        /// Duration, s.
         duration: f64,
     },
 }
 
-/// How time is divided.
+/// Division of time into steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Stepping {
-    /// By the material: no step changes α by more than `degree`, or T by more than `kelvin`.
+    /// Adaptive steps: none changes α by more than `degree`, or T by more than `kelvin`.
     Adaptive {
         /// Largest change of α in a step.
         degree: f64,
         /// Largest change of temperature in a step, K.
         kelvin: f64,
     },
-    /// Steps of the same change of temperature, K; a hold is one step.
+    /// Steps of equal change of temperature, K; a hold is one step.
     Kelvin(f64),
-    /// Steps of the same time, s.
+    /// Steps of equal time, s.
     Seconds(f64),
 }
 
@@ -51,20 +51,20 @@ impl Default for Stepping {
     }
 }
 
-/// Steps that a curve may have.
+/// Limit on the steps of a curve.
 pub const MOST_STEPS: usize = 1_000_000;
 
-/// A material and what happens to it.
+/// A material with its thermal process.
 pub struct Course<'a> {
     /// The material.
     pub material: &'a dyn ThermalMaterial,
-    /// What drives its temperature.
+    /// Source of the temperature.
     pub drive: Drive,
-    /// How time is divided.
+    /// Division of time into steps.
     pub stepping: Stepping,
 }
 
-/// Rows of equal length: the start and the end of each step.
+/// Columns of equal length, with a row for the start and for the end of each step.
 #[derive(Clone, Debug, Default)]
 pub struct Curves {
     /// Time, s.
@@ -75,17 +75,17 @@ pub struct Curves {
     pub energy: Vec<f64>,
     /// dα/dt of growth, 1/s.
     pub rate: Vec<f64>,
-    /// States, a vector for each row.
+    /// States, a vector per row.
     pub states: Vec<Vec<f64>>,
-    /// Fields of the material, a vector for each row.
+    /// Fields of the material, a vector per row.
     pub fields: Vec<Vec<f64>>,
-    /// The segment of the history that ends each row's step.
+    /// Segment of the history on which each row's step ends.
     segments: Vec<Option<Segment>>,
-    /// Steps rejected as too large.
+    /// Number of rejected steps.
     pub rejected: usize,
 }
 
-/// When and where something happens.
+/// Time and temperature of an event.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Event {
     /// Time, s.
@@ -96,7 +96,7 @@ pub struct Event {
     pub rate: f64,
 }
 
-/// The end of a step.
+/// Values at the end of a step.
 struct End {
     temperature: f64,
     energy: f64,
@@ -105,11 +105,11 @@ struct End {
 }
 
 impl Course<'_> {
-    /// The curves.
+    /// Computes the curves.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for steps that are not above 0 or more than [`MOST_STEPS`]; what the material
-    /// refuses.
+    /// [`Error::Parameter`] for steps that are not above 0 or more than [`MOST_STEPS`]; errors of the
+    /// material.
     pub fn run(&self) -> Result<Curves, Error> {
         self.check()?;
         let mut state = vec![0.0; self.material.state_names().len()];
@@ -173,7 +173,7 @@ impl Course<'_> {
         }
     }
 
-    /// Steps through a segment, or through the whole time of a lumped body.
+    /// Steps through a segment, or through the whole duration of a lumped body.
     fn follow(&self, curves: &mut Curves, segment: Option<Segment>) -> Result<(), Error> {
         let (begin, end, slope) = match (&self.drive, &segment) {
             (Drive::Lumped { duration, .. }, _) => (0.0, *duration, 0.0),
@@ -206,7 +206,7 @@ impl Course<'_> {
         }
         loop {
             let left = duration - done;
-            // no sliver at the end
+            // avoid a tiny last step
             let dt = if wish >= left * (1.0 - 1e-9) { left } else { wish.min(widest) };
             let row = curves.time.len() - 1;
             let last = dt == left;
@@ -234,7 +234,7 @@ impl Course<'_> {
         }
     }
 
-    /// Allowed over actual change of a step.
+    /// Ratio of allowed to actual change of a step.
     fn ratio(&self, curves: &Curves, row: usize, found: &End) -> f64 {
         let Stepping::Adaptive { degree, kelvin } = self.stepping else { return 1.0 };
         let mut ratio = f64::INFINITY;
@@ -243,14 +243,14 @@ impl Course<'_> {
             self.material.fields(&found.state, &mut fields);
             ratio = degree / (fields[index] - curves.fields[row][index]).abs();
         }
-        // prescribed temperatures are limited beforehand
+        // steps along prescribed temperatures are limited in advance
         if matches!(self.drive, Drive::Lumped { .. }) {
             ratio = ratio.min(kelvin / (found.temperature - curves.temperature[row]).abs());
         }
         if ratio.is_nan() { 1.0 } else { ratio }
     }
 
-    /// From a row to a later time.
+    /// Steps from a row to a later time.
     fn step(
         &self,
         curves: &Curves,
@@ -288,7 +288,7 @@ impl Course<'_> {
         Ok(End { temperature, energy: response.energy, state, step_ratio: response.step_ratio })
     }
 
-    /// Heat capacity at rest, J/(kg K).
+    /// Heat capacity at constant state, J/(kg K).
     fn capacity(&self, temperature: f64) -> f64 {
         let mut state = vec![0.0; self.material.state_names().len()];
         self.material.initial_state(temperature, &mut state);
@@ -308,15 +308,15 @@ impl Course<'_> {
         curves.segments.push(segment);
     }
 
-    /// Where α stands among the fields.
+    /// Index of α among the fields.
     pub fn degree_index(&self) -> Option<usize> {
         self.material.field_names().iter().position(|name| *name == "alpha")
     }
 
-    /// When α first reaches a degree from below: found by repeating the step in which it does, to rounding.
+    /// Locates the first upward crossing of α through a degree, by repeating its step, to rounding.
     ///
     /// # Errors
-    /// As [`Course::run`].
+    /// Errors of [`Course::run`].
     pub fn reaching(&self, curves: &Curves, degree: f64) -> Result<Option<Event>, Error> {
         let Some(index) = self.degree_index() else { return Ok(None) };
         let alpha = |row: usize| curves.fields[row][index];
@@ -335,10 +335,10 @@ impl Course<'_> {
         self.event(curves, row, high).map(Some)
     }
 
-    /// When dα/dt of growth is greatest: by golden section about the greatest row.
+    /// Locates the maximum of dα/dt, by golden section around the largest row.
     ///
     /// # Errors
-    /// As [`Course::run`].
+    /// Errors of [`Course::run`].
     pub fn peak(&self, curves: &Curves) -> Result<Option<Event>, Error> {
         let rows = curves.time.len();
         let finite = (0..rows).filter(|&row| curves.rate[row] > 0.0 && curves.rate[row].is_finite());
@@ -370,14 +370,14 @@ impl Course<'_> {
         Ok(Event { time, temperature: end.temperature, rate })
     }
 
-    /// A share of the step that ended at a row.
+    /// Repeats a fraction of the step that ended at a row.
     fn within(&self, curves: &Curves, row: usize, share: f64) -> Result<End, Error> {
         let [from, to] = [curves.time[row - 1], curves.time[row]];
         let dt = share * (to - from);
         if to > from {
             return self.step(curves, row - 1, curves.segments[row].as_ref(), from, from + dt, dt);
         }
-        // a share of a jump
+        // a fraction of a jump
         let [a, b] = [curves.temperature[row - 1], curves.temperature[row]];
         let jump = Segment { times: [from, from], temperatures: [a, a + share * (b - a)] };
         self.step(curves, row - 1, Some(&jump), from, from, 0.0)

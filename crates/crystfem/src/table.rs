@@ -1,12 +1,11 @@
-//! Columns of tables of measured numbers, read by [`polycore::table`], and the names under which calorimeters
-//! write them.
+//! Columns of measured data, read by [`polycore::table`], and the headings that calorimeters use.
 
 use crate::error::Error;
 use polycore::table::{self, Table};
 use polycore::units::Dimension;
 use std::path::Path;
 
-/// Other names of a column, the likeliest first.
+/// Alternative names of a column, the likeliest first.
 const NAMES: [(&str, &[&str]); 4] = [
     ("time", &["time", "t", "elapsed time", "test time", "zeit"]),
     (
@@ -44,10 +43,10 @@ fn names(name: &'static str) -> Vec<&'static str> {
     NAMES.iter().find(|(first, _)| *first == name).map_or(vec![name], |(_, all)| all.to_vec())
 }
 
-/// Reads a column in SI; the unit is that of headings without one.
+/// Reads a column in SI; the unit applies to headings without one.
 type Read = fn(&Table, usize, Option<&str>) -> Result<Vec<f64>, table::Error>;
 
-/// A column that is requested.
+/// A requested column.
 #[derive(Clone, Copy)]
 pub struct Column {
     name: &'static str,
@@ -59,39 +58,39 @@ pub struct Column {
 }
 
 impl Column {
-    /// A column of quantities of dimension `D`.
+    /// Returns a column of quantities of dimension `D`.
     pub fn of<D: Dimension>(name: &'static str) -> Self {
         let (least, most) = (f64::NEG_INFINITY, f64::INFINITY);
         Self { name, read: Table::column::<D>, example: D::EXAMPLE, unit: None, least, most }
     }
 
-    /// Takes a heading without a unit in this one.
+    /// Accepts a heading without a unit, with this default unit.
     pub fn or_unit(mut self, unit: &'static str) -> Self {
         self.unit = Some(unit);
         self
     }
 
-    /// Refuses numbers, in SI, outside a range.
+    /// Limits the range of values, in SI.
     pub fn within(mut self, least: f64, most: f64) -> Self {
         (self.least, self.most) = (least, most);
         self
     }
 }
 
-/// Reads columns, in SI units, whatever their order and units in the file; others are passed over.
+/// Reads columns in SI units, in any order and units in the file; other columns are ignored.
 ///
 /// # Errors
 /// [`Error::File`] with line and column for a file that cannot be read, a missing or repeated column, a row
-/// of another length, what is no finite number or not of the column's dimension, a number out of its range,
-/// and no row at all.
+/// of another length, a cell that is not a finite number of the column's dimension, a number out of range,
+/// and a table without rows.
 pub fn read<const N: usize>(path: &Path, columns: [Column; N]) -> Result<[Vec<f64>; N], Error> {
     read_with_lines(path, columns).map(|(data, _)| data)
 }
 
-/// As [`read`], with the line of each row, from 1.
+/// Reads like [`read`], and returns the line of each row, from 1.
 ///
 /// # Errors
-/// As [`read`].
+/// Errors of [`read`].
 pub fn read_with_lines<const N: usize>(
     path: &Path,
     columns: [Column; N],
@@ -123,7 +122,7 @@ pub fn read_with_lines<const N: usize>(
     Ok((data, (0..table.rows()).map(|row| table.line(row)).collect()))
 }
 
-/// One line: how a table of a calorimeter is understood; nothing of what is none.
+/// Describes how a calorimeter table is interpreted, in one line; `None` for other files.
 pub fn understood(path: &Path) -> Option<String> {
     let table = Table::read(path).ok()?;
     let used: Vec<usize> = NAMES.iter().flat_map(|(_, names)| table.matching(names)).collect();
@@ -138,7 +137,7 @@ impl From<table::Error> for Error {
     }
 }
 
-/// A table, whose faults are those of a line of a file.
+/// Opens a table; errors point to lines of the file.
 fn open(path: &Path) -> Result<Table, Error> {
     Table::read(path).map_err(|error| match error {
         polycore::Error::Table(error) => error.into(),
@@ -202,8 +201,8 @@ mod tests {
         );
     }
 
-    /// Exports of calorimeters: the same three rows of Netzsch (Latin-1), TA Instruments (UTF-16), Mettler,
-    /// PerkinElmer and of a spreadsheet.
+    /// Exports of calorimeters: the same three rows from Netzsch (Latin-1), TA Instruments (UTF-16), Mettler,
+    /// PerkinElmer and a spreadsheet.
     #[test]
     fn exports_of_calorimeters() {
         let netzsch = "#EXO:1\r\n#DECIMAL:COMMA\r\n##Temp./°C;Time/min;DSC/(mW/mg)\r\n200,5;0,0;0,05\r\n\

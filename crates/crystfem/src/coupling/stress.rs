@@ -54,7 +54,6 @@ struct Thermal {
     nodes: [f64; MOST],
     /// Number of nodes.
     count: usize,
-    count: usize,
     /// α.
     degree: f64,
     /// Time, s.

@@ -249,7 +249,7 @@ proptest::proptest! {
         }
     }
 
-    /// One step across the whole window at 1e-3 to 1e6 K/min gives α of exact quadrature.
+    /// A single step across the whole window at 1e-3 to 1e6 K/min gives α of exact quadrature.
     #[test]
     fn one_step_across_the_window(rate in -3.0..6.0_f64, column in 0..2_usize) {
         let constants = [Constants::TABLE_4_1_COLUMN_1, Constants::TABLE_4_1_COLUMN_2][column];

@@ -29,8 +29,7 @@ fn cooling(rate: f64) -> Drive {
     Drive::Prescribed(History::from_legs(200.0 + ZERO, &[leg]).unwrap())
 }
 
-/// The events are those of exact quadrature; Gauss' rule at 0.5 K has an error in α of 2e-8, and dα/dT < 0.3
-/// /K.
+/// Events agree with exact quadrature; Gauss' rule at 0.5 K has an error in α of 2e-8, and dα/dT < 0.3 /K.
 #[test]
 fn events_of_a_cooling() {
     for constants in [Constants::TABLE_4_1_COLUMN_1, Constants::TABLE_4_1_COLUMN_2] {
@@ -46,7 +45,7 @@ fn events_of_a_cooling() {
                 assert!((found.time - (473.15 - expected) * 60.0 / rate).abs() < 1e-3);
             }
             let peak = course.peak(&curves).unwrap().unwrap();
-            // a maximum is as sharp as √ε of what is computed
+            // a maximum is located to √ε of the width
             assert!((peak.temperature - exact.peak()).abs() < 2e-3, "{} {}", peak.temperature, exact.peak());
             let largest = curves.fields.windows(2).map(|w| w[1][0] - w[0][0]).fold(0.0, f64::max);
             assert!(largest <= 0.01 && curves.time.len() < 600, "{largest} {}", curves.time.len());
@@ -55,9 +54,9 @@ fn events_of_a_cooling() {
 }
 
 /// Erratum 9: Newton's cooling with τ such that the rate at 165 °C is 1, 2, 10 K/min. Latent heat shifts
-/// T(0.5) by +5.7, +6.1, +7.0 K and makes the time to α = 0.99 longer by 38, 35, 29 %: half a unit of each
-/// last digit. The reference (`reference/ch4/latent.py`) knows no melting; with it recalescence melts a
-/// little: +5.6 K at 1 K/min.
+/// T(0.5) by +5.7, +6.1, +7.0 K and lengthens the time to α = 0.99 by 38, 35, 29 %; tolerance half a unit of
+/// the last digits. The reference (`reference/ch4/latent.py`) has no melting; with melting, recalescence
+/// melts a little: +5.6 K at 1 K/min.
 #[test]
 fn erratum_9_latent_heat_matters() {
     for (rate, shift, longer) in [(1.0, 5.7, 38.0), (2.0, 6.1, 35.0), (10.0, 7.0, 29.0)] {
@@ -82,8 +81,7 @@ fn erratum_9_latent_heat_matters() {
     }
 }
 
-/// Erratum 9: adiabatic rise ΔH X∞/c = 23.75 K; the energy does not change. In any number of steps, one
-/// included.
+/// Erratum 9: adiabatic rise ΔH X∞/c = 23.75 K at constant energy, in any number of steps, one included.
 #[test]
 fn adiabatic_rise() {
     let material = pa12(Constants::TABLE_4_1_COLUMN_1, Some(209e3));
@@ -91,14 +89,14 @@ fn adiabatic_rise() {
     for stepping in [Stepping::default(), Stepping::Seconds(3600.0), Stepping::Seconds(1.0)] {
         let curves = Course { material: &material, drive: drive.clone(), stepping }.run().unwrap();
         let end = curves.temperature[curves.temperature.len() - 1];
-        // in one step, what melts on the last part of the rise grows back there to 1e-7
+        // in one step, crystals melted in the last part of the rise regrow to 1e-7
         assert!((end - 423.75).abs() < 1e-5, "{stepping:?} {end}");
         let drift = curves.energy.iter().map(|u| (u - curves.energy[0]).abs()).fold(0.0, f64::max);
         assert!(drift < 1e-6, "{drift} J/kg");
     }
 }
 
-/// A conductor in a lumped body: T = T_a + (T_i − T_a) e^{−t/τ}, second order in the step.
+/// Lumped conductor: T = T_a + (T_i − T_a) e^{−t/τ}, second order in the step.
 #[test]
 fn lumped_cooling_is_exponential() {
     let constant = |value| Property::constant("a property", value).unwrap();
@@ -115,7 +113,7 @@ fn lumped_cooling_is_exponential() {
     assert!(error(0.1) < 5e-6, "{}", error(0.1));
 }
 
-/// Jumps, holds, no time at all, one step over everything: what is requested, and finite.
+/// Jumps, holds, zero duration and one step over everything give the requested, finite temperatures.
 #[test]
 fn limits() {
     let material = pa12(Constants::TABLE_4_1_COLUMN_1, Some(209e3));

@@ -1,10 +1,10 @@
-//! Stabilized biconjugate gradients, for matrices that are not symmetric, with the diagonal as preconditioner
-//! on the right (van der Vorst 1992, doi:10.1137/0913035).
+//! Stabilized biconjugate gradients for matrices that are not symmetric, with the diagonal as right
+//! preconditioner (van der Vorst 1992, doi:10.1137/0913035).
 
 use super::{Ended, Goal, Operator, norm_squared};
 use crate::system::vector::{set, sum};
 
-/// Biconjugate gradients with their work space.
+/// Work vectors of stabilized biconjugate gradients.
 #[derive(Clone, Debug, Default)]
 pub struct BiconjugateGradients {
     shadow: Vec<f64>,
@@ -15,8 +15,8 @@ pub struct BiconjugateGradients {
 }
 
 impl BiconjugateGradients {
-    /// Solves A x = r from x = 0; arguments as of [`super::ConjugateGradients::solve`]. It stops by the
-    /// residual: at √(Σ r²/diagonal / `capacity`) = `tolerance`.
+    /// Solves A x = r from x = 0; arguments as for [`super::ConjugateGradients::solve`]. Converged when the
+    /// residual √(Σ r²/diagonal / `capacity`) is below `tolerance`.
     pub fn solve(
         &mut self,
         operator: &Operator,
@@ -33,7 +33,7 @@ impl BiconjugateGradients {
         }
         solution.fill(0.0);
         let goal = (tolerance * tolerance * capacity).max(floor);
-        // 0 restarts: along the residual, with the residual as shadow
+        // 0 restarts along the residual, with the residual as shadow
         let (mut rho, mut alpha, mut omega) = (0.0, 0.0, 0.0);
         for iteration in 0..limit {
             if stop() {
@@ -89,7 +89,7 @@ mod tests {
     use super::*;
     use crate::system::{FaceMatrices, Rows};
 
-    /// A line of 300 whose columns are scaled by 1 or 10: x known.
+    /// Solves for a known x on a line of 300 whose columns are scaled by 1 or 10.
     #[test]
     fn a_matrix_with_scaled_columns() {
         let size = 300;

@@ -1,59 +1,60 @@
-//! Conjugate gradients with the diagonal or a multigrid cycle as preconditioner, without a stored matrix
-//! where the mesh has equal rows.
+//! Conjugate gradients with the diagonal or a multigrid cycle as preconditioner, matrix-free if the mesh has
+//! equal rows.
 //!
-//! It stops by the error, not by the residual: eᵀAe after k steps is Σ_{j≥k} α_j (r_j·z_j) (Hestenes &
-//! Stiefel 1952, doi:10.6028/jres.049.044), continued here as a geometric series; and eᵀAe ≥ eᵀCe, C the
-//! capacity, so that the root of eᵀAe/ΣC bounds the capacity-weighted rms error of temperature.
+//! The error stops the iteration, not the residual: eᵀAe after k steps is Σ_{j≥k} α_j (r_j·z_j) (Hestenes &
+//! Stiefel 1952, doi:10.6028/jres.049.044), extrapolated here as a geometric series; and eᵀAe ≥ eᵀCe, C the
+//! capacity, so that √(eᵀAe/ΣC) bounds the capacity-weighted rms error of temperature.
 
 use super::Operator;
 use super::multigrid::Multigrid;
 use crate::solver::norm_squared;
 use crate::system::vector::{advance, blend, dot, turn};
 
-/// How an iteration ended.
+/// Outcome of an iteration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ended {
-    /// Iterations.
+    /// Number of iterations.
     pub iterations: usize,
     /// Estimated rms error, K.
     pub error: f64,
-    /// Whether the error is below the tolerance, or nothing but rounding is left.
+    /// True if the error is below the tolerance, or at rounding.
     pub converged: bool,
 }
 
-/// When an iteration ends.
+/// Stopping criterion of an iteration.
 #[derive(Clone, Copy)]
 pub struct Goal<'a> {
     /// ΣC, J/K.
     pub capacity: f64,
-    /// Error at which it has converged, K.
+    /// Tolerance of the error, K.
     pub tolerance: f64,
-    /// A square of the residual's norm that is rounding.
+    /// Square of the residual norm that is due to rounding.
     pub floor: f64,
-    /// Iterations at most.
+    /// Limit on iterations.
     pub limit: usize,
-    /// Whether to give up.
+    /// Requests a stop.
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }
 
 /// Relative change of a solution by packed rows, in the norm of A: 2⁻²⁴ of the terms |a_ij| (x_i − x_j)²/2,
-/// which add up to at most about four times xᵀAx, as entries of both signs do.
+/// whose sum is at most about four times xᵀAx, since entries have both signs.
 const PACKED: f64 = 4.0 / 16_777_216.0;
-/// Part of the error that is left, and of the tolerance, that it may be.
+/// Fraction of the remaining error that packed rows may cause.
 const UNSEEN: f64 = 0.03;
+/// Fraction of the tolerance that packed rows may cause.
 const UNSEEN_AT_END: f64 = 0.3;
 
-/// The last four terms of eᵀAe, from which the sum of those that follow is estimated.
+/// Error estimate: the last four terms of eᵀAe, from which the remaining sum is extrapolated.
 struct Estimate {
     terms: [f64; 4],
-    /// xᵀAx of what was added to the solution since its residual was computed with A itself.
+    /// xᵀAx of the changes of the solution since its residual was computed with A itself.
     since: f64,
 }
 
-/// What comes after an iteration.
+/// Action after an iteration.
 enum Next {
     Iterate,
-    /// The residual of A itself first.
+    /// Recompute the residual with A itself first.
     Renew,
     End(Ended),
 }
@@ -63,7 +64,7 @@ impl Estimate {
         Self { terms: [f64::INFINITY; 4], since: 0.0 }
     }
 
-    /// Adds a term.
+    /// Adds a term, and returns the next action.
     fn next(&mut self, term: f64, iterations: usize, goal: &Goal, packed: bool) -> Next {
         self.since += term;
         let Some(left) = self.left(term) else { return Next::Iterate };
@@ -81,44 +82,44 @@ impl Estimate {
         Next::End(Ended { iterations, error, converged: true })
     }
 
-    /// After all iterations.
+    /// Returns the outcome at the iteration limit.
     fn given_up(&self, goal: &Goal) -> Ended {
         let error = (self.terms[3] / goal.capacity).sqrt();
         Ended { iterations: goal.limit, error, converged: false }
     }
 
-    /// The sum of the terms after this one, K²·J/K; `None` where it is not known yet.
+    /// Estimates the sum of later terms, K²·J/K; `None` if unknown yet.
     fn left(&mut self, term: f64) -> Option<f64> {
         let terms = &mut self.terms;
         let first = terms[3] == f64::INFINITY;
         terms.rotate_left(1);
         terms[3] = term;
-        // terms shrink by ρ each, over three iterations and over the last one
+        // terms decrease by ρ each, over three iterations and over the last one
         let ratio = |from: usize| if terms[from] < f64::INFINITY { terms[3] / terms[from] } else { 1.0 };
         let rho = if terms[0] < f64::INFINITY { ratio(0).cbrt().max(ratio(2)) } else { ratio(2) };
         (!first && rho < 0.9999).then(|| terms[3] * rho / (1.0 - rho))
     }
 }
 
-/// Conjugate gradients with their work space.
+/// Work vectors of conjugate gradients.
 #[derive(Clone, Debug, Default)]
 pub struct ConjugateGradients {
     direction: Vec<f64>,
     image: Vec<f64>,
     conditioned: Vec<f64>,
-    /// r at the start, where products are rounded.
+    /// Initial residual, kept if products are rounded.
     right: Vec<f64>,
 }
 
 impl ConjugateGradients {
-    /// See [`super::Iterative::lend`].
+    /// Swaps work vectors, see [`super::Iterative::swap_vectors`].
     pub fn swap_vectors(&mut self, direction: &mut Vec<f64>, image: &mut Vec<f64>) {
         std::mem::swap(&mut self.direction, direction);
         std::mem::swap(&mut self.image, image);
     }
 
-    /// Solves A x = r from x = 0, with a multigrid cycle or the diagonal as preconditioner. `inverse` is one
-    /// over A's diagonal, 0 where x stays 0; `residual` becomes r − A x.
+    /// Solves A x = r from x = 0, preconditioned by a multigrid cycle or the diagonal. `inverse` is the
+    /// reciprocal of A's diagonal, 0 where x stays 0; `residual` becomes r − A x.
     pub fn solve(
         &mut self,
         mut multigrid: Option<&mut Multigrid>,
@@ -183,7 +184,7 @@ impl ConjugateGradients {
     }
 }
 
-/// r = right − A x, of A itself: the directions go on (van der Vorst & Ye 2000,
+/// Recomputes r = right − A x with A itself; the search directions are kept (van der Vorst & Ye 2000,
 /// doi:10.1137/S1064827599353865).
 fn renew(operator: &Operator, right: &[f64], inverse: &[f64], residual: &mut [f64], solution: &[f64]) {
     operator.exact().product(solution, residual);
@@ -195,7 +196,7 @@ mod tests {
     use super::*;
     use crate::system::{FaceMatrices, Rows};
 
-    /// A line of 500 with diagonal 2 + 1e-3: x known; the estimate bounds the true error.
+    /// Estimate bounds the true error for a known x on a line of 500 with diagonal 2 + 1e-3.
     #[test]
     fn the_error_is_below_the_tolerance() {
         let size = 500;

@@ -1,4 +1,4 @@
-//! Linear systems of one stage of a step, A δ = r with A = D + M + a·(K + faces).
+//! Linear solvers for one stage of a step, A δ = r with A = D + M + a·(K + faces).
 
 mod aggregation;
 mod bicgstab;
@@ -22,29 +22,29 @@ use crate::system::{FaceMatrices, Rows};
 use bicgstab::BiconjugateGradients;
 use cg::ConjugateGradients;
 
-/// A = D + `weights[0]`·M + `weights[1]`·(K + faces).
+/// Matrix A = D + `weights[0]`·M + `weights[1]`·(K + faces).
 #[derive(Clone, Copy)]
 pub struct Operator<'a> {
-    /// M and K.
+    /// Matrices M and K.
     pub rows: &'a Rows,
-    /// D: lumped capacity and surfaces; `None` with consistent capacity.
+    /// Diagonal D, lumped capacity and surfaces; `None` with consistent capacity.
     pub diagonal: Option<&'a [f64]>,
     /// Factors of M and K.
     pub weights: [f64; 2],
-    /// Surfaces with consistent capacity.
+    /// Surface matrices with consistent capacity.
     pub faces: &'a FaceMatrices,
-    /// M and K for the iterations, where rows are unequal: A with consistent capacity, K with lumped one.
-    /// Rounded to single precision.
+    /// Packed single-precision rows for the iterations, if rows are unequal: A with consistent capacity, K
+    /// with lumped capacity.
     pub packed: Option<&'a Packed>,
 }
 
 impl Operator<'_> {
-    /// Without packed rows.
+    /// Returns the operator without packed rows.
     pub fn exact(&self) -> Self {
         Self { packed: None, ..*self }
     }
 
-    /// y = A x; returns x·y.
+    /// Computes y = A x; returns x·y.
     pub fn product(&self, x: &[f64], y: &mut [f64]) -> f64 {
         let product = match self.packed {
             Some(packed) => {
@@ -63,12 +63,12 @@ impl Operator<'_> {
     }
 }
 
-/// The iterative methods with their work space.
+/// Iterative methods with their work vectors.
 #[derive(Default)]
 pub struct Iterative {
     conjugate: ConjugateGradients,
     biconjugate: BiconjugateGradients,
-    /// The preconditioner of symmetric matrices, where it is not the diagonal.
+    /// Multigrid preconditioner of symmetric matrices, if used.
     pub multigrid: Cached<Option<Multigrid>>,
 }
 
@@ -79,8 +79,8 @@ impl Iterative {
         self.conjugate.swap_vectors(direction, image);
     }
 
-    /// Solves A x = r from x = 0 by the method that suits the matrix. `inverse` is one over A's diagonal, 0
-    /// where x stays 0; `residual` becomes r − A x, as the iterations know it.
+    /// Solves A x = r from x = 0 by the method that suits the matrix. `inverse` is the reciprocal of A's
+    /// diagonal, 0 where x stays 0; `residual` becomes r − A x, as tracked by the iteration.
     pub fn solve(
         &mut self,
         operator: &Operator,
@@ -99,7 +99,7 @@ impl Iterative {
     }
 }
 
-/// Σ r²/D: the square of a residual's norm.
+/// Squared norm of a residual, Σ r²/D.
 pub fn norm_squared(residual: &[f64], inverse: &[f64]) -> f64 {
     weighted_square(residual, inverse)
 }

@@ -1,10 +1,10 @@
-//! A matrix for the iterations alone, where most rows are distinct: entries combined for one step, in single
-//! precision, eight rows side by side.
+//! Packed matrix for iterations on mostly distinct rows: entries combined for one step, in single precision,
+//! eight rows side by side.
 //!
-//! Iterations on unequal rows take as long as reading them from memory does. Entries beside the diagonal are
-//! rounded to f32, and the diagonal takes what that leaves, so that sums of rows stay those of f64. The
-//! energy xᵀAx is then that of A to about 2⁻²⁴ in long and short steps alike; conjugate gradients go on from
-//! the residual of A itself before that shows.
+//! Iterations on unequal rows are limited by memory bandwidth. Off-diagonal entries are rounded to f32, and
+//! the diagonal takes the rounding errors, so that row sums stay those of f64. The energy xᵀAx then agrees
+//! with that of A to about 2⁻²⁴ for long and short steps alike; conjugate gradients recompute the residual
+//! with A itself before the difference matters.
 
 use crate::system::Rows;
 use crate::system::vector::CHUNK;
@@ -12,59 +12,59 @@ use polycore::numerics::ordered_sum;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-/// Rows side by side.
+/// Number of rows side by side.
 const LANES: usize = 8;
-/// Entries of a block over those of its longest row at most, where its rows share a list of distances.
+/// Largest ratio of a block's entries to those of its longest row, for blocks whose rows share offsets.
 const MOST_SPREAD: f64 = 1.3;
 
-/// Rows of M and K for given factors, packed.
+/// Packed rows of a combination of M and K.
 #[derive(Default)]
 pub struct Packed {
     items: Vec<Kept>,
-    /// For which rows and factors it was made.
+    /// Versions of rows, and factors, for which it was made.
     made_for: Option<([u64; 2], [u64; 2])>,
     any: bool,
 }
 
-/// A work item, and for what it was made: births change few of them.
+/// A work item with its versions: births change few items.
 #[derive(Default)]
 struct Kept {
-    /// `None` where rows are mostly equal.
+    /// `None` if rows are mostly equal.
     item: Option<Item>,
-    /// For which pattern.
+    /// Version of the pattern.
     shaped_for: Option<u64>,
-    /// For which values and factors.
+    /// Version of the values, and factors.
     filled_for: Option<(u64, [u64; 2])>,
 }
 
-/// Rows of one work item.
+/// Packed rows of one work item.
 #[derive(Default)]
 struct Item {
-    /// The diagonal and what rounding took from the other entries.
+    /// Diagonal plus the rounding errors of the other entries.
     core: Vec<f64>,
-    /// Beside the diagonal, block after block, entry after entry.
+    /// Off-diagonal entries, block by block.
     values: Vec<[f32; LANES]>,
     blocks: Vec<Block>,
-    /// Distances from the diagonal, of blocks with few of them.
+    /// Distances from the diagonal, for banded blocks.
     offsets: Vec<i32>,
     /// Columns of the other blocks.
     columns: Vec<[u32; LANES]>,
 }
 
-/// Eight rows, or the last ones.
+/// A block of eight rows, or of the last ones.
 #[derive(Clone, Copy)]
 struct Block {
-    /// Its first entry in `offsets` or `columns`.
+    /// Index of its first entry in `offsets` or `columns`.
     first: u32,
     count: u16,
     banded: bool,
 }
 
 impl Packed {
-    /// Makes it of these rows, as far as it is not yet; false where no rows are packed.
+    /// Updates outdated work items; returns false if no rows are packed.
     pub fn update(&mut self, rows: &Rows, weights: [f64; 2]) -> bool {
         let factors = weights.map(f64::to_bits);
-        // few distinct rows stay in caches as they are
+        // few distinct rows stay in caches unpacked
         if rows.are_few() {
             *self = Self::default();
             return false;
@@ -88,7 +88,7 @@ impl Packed {
         self.any
     }
 
-    /// y = (diagonal + `factor`·A) x; returns x·y. `weights` are `factor` times those of A.
+    /// Computes y = (diagonal + `factor`·A) x; returns x·y. `weights` are `factor` times those of A.
     pub fn product(
         &self,
         rows: &Rows,
@@ -111,7 +111,7 @@ impl Packed {
 }
 
 impl Item {
-    /// The pattern of a work item.
+    /// Builds the pattern of a work item.
     fn new(rows: &Rows, index: usize) -> Self {
         let mut item = Self::default();
         let (start, end) = (index * CHUNK, ((index + 1) * CHUNK).min(rows.size()));
@@ -172,7 +172,7 @@ impl Item {
         item
     }
 
-    /// The entries for these factors.
+    /// Fills in the entries for given factors.
     fn fill(&mut self, rows: &Rows, index: usize, weights: [f64; 2]) {
         self.values.fill([0.0; LANES]);
         let mut values = self.values.as_mut_slice();
@@ -209,7 +209,7 @@ impl Block {
     }
 }
 
-/// One work item of a product.
+/// Product of one work item.
 struct Product<'a> {
     item: &'a Item,
     diagonal: Option<&'a [f64]>,
@@ -276,7 +276,7 @@ impl WithSimd for Product<'_> {
     }
 }
 
-/// Adds an entry of eight rows times those of a vector.
+/// Adds an entry of eight rows times entries of a vector.
 #[inline(always)]
 fn add<S: Simd>(simd: S, entry: &[f32; LANES], x: &[f64], sums: &mut [S::f64s; LANES]) {
     let mut wide = [0.0; LANES];
@@ -294,8 +294,8 @@ mod tests {
     use super::*;
     use crate::system::Row;
 
-    /// A grid of 90 × 70 with unequal entries, of neighbours in order and of neighbours anywhere: products as
-    /// with f64 to the rounding of f32, and exactly so on uniform vectors.
+    /// Products on a grid of 90 × 70 with unequal entries, between ordered and between scattered neighbours,
+    /// agree with f64 to the rounding of f32, and exactly on uniform vectors.
     #[test]
     fn products_of_grids_and_of_unordered_rows() {
         let (width, height) = (90, 70);
@@ -347,8 +347,8 @@ mod tests {
         }
     }
 
-    /// Rows that change or come at the end have their work items packed anew, others not; the products are
-    /// those of rows made at once.
+    /// Only work items with changed or appended rows are packed again; products equal those of rows made at
+    /// once.
     #[test]
     fn what_has_not_changed_is_kept() {
         let fill = |scale: f64| {
@@ -386,7 +386,7 @@ mod tests {
         assert!(kept == exact && dots[0] == dots[1]);
     }
 
-    /// What is added to a row of its own, and taken back, is packed again with its work item.
+    /// Additions to a row with its own values are packed again with their work item.
     #[test]
     fn rows_of_their_own() {
         let fill = |own: bool| {
@@ -419,7 +419,7 @@ mod tests {
         assert_eq!(first, product(&mut packed, &rows));
     }
 
-    /// Where rows are equal nothing is packed.
+    /// Equal rows are not packed.
     #[test]
     fn equal_rows_are_left() {
         let rows = Rows::build(10_000, false, |_, out| {

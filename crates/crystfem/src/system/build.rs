@@ -1,8 +1,8 @@
-//! Adding elements to the equations: all that exist at first, and those of a birth later.
+//! Assembly: all elements that exist at first, and those of a birth later.
 //!
-//! A birth costs what it adds. Equations are appended ([`super::numbering`]); rows, capacity, points and
-//! faces are made anew at the nodes of new elements only, and what stands behind the first of them in a list
-//! moves. The result is that of building all at once, bit by bit.
+//! The cost of a birth is proportional to what it adds. Equations are appended ([`super::numbering`]); rows,
+//! capacity, points and faces are rebuilt at the nodes of new elements only, and later entries of lists move.
+//! The result equals that of building everything at once, bit by bit.
 
 use super::around::Around;
 use super::classes::{Class, OWN, VARYING, classify, matrices};
@@ -20,48 +20,48 @@ use crate::problem::{Capacity, Problem};
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 
-/// Elements whose matrices are made before they are added.
+/// Number of elements whose matrices are computed before they are added.
 const BATCH: usize = 4096;
 
-/// Where points are that stand at a place or behind it.
+/// Moves of points from an index on.
 #[derive(Clone, Debug, Default)]
 pub struct Moves {
-    /// That place.
+    /// First index that may have moved.
     pub first: usize,
-    /// Where each was before, or [`NONE`].
+    /// Former index of each point from there on, or [`NONE`].
     pub from: Vec<u32>,
 }
 
-/// What elements did that were added.
+/// Changes of a system by added elements.
 #[derive(Clone, Debug, Default)]
 pub struct Added {
-    /// Equations of their nodes, ascending, with the capacity of linear materials before, J/K; `None` where
-    /// nothing was.
+    /// Equations of their nodes, ascending, with the former capacity of linear materials, J/K; `None` for new
+    /// nodes.
     pub before: Vec<(u32, Option<f64>)>,
-    /// Points at nodes.
+    /// Moves of points at nodes.
     pub nodal: Moves,
-    /// Points in elements.
+    /// Moves of points in elements.
     pub general: Moves,
-    /// Elements that were visited: the new ones and their neighbours.
+    /// Number of visited elements: new ones and their neighbours.
     pub visited: u64,
 }
 
-/// What of a problem never changes, as building needs it.
+/// Constant data of a problem, for assembly.
 pub struct Plan {
     pub(super) numbering: Numbering,
     around: Around,
     /// Class of each element.
     kinds: Vec<u16>,
     classes: Vec<Class>,
-    /// By their corners, faces on which each condition acts, or does not.
+    /// Faces on which each condition acts, or does not, by their corners.
     named: Vec<HashSet<[u32; 4]>>,
-    /// The last condition that prescribes a node's temperature.
+    /// Last condition that prescribes the temperature of a node.
     held: HashMap<u32, u32>,
     /// Elements of each source, ascending.
     heated: Vec<Vec<u32>>,
 }
 
-/// Matrices of an element of its own.
+/// Geometry of an element outside all classes.
 enum Own {
     Narrow(Box<Geometry>),
     Wide(Box<Geometry<WIDE, WIDE_POINTS>>),
@@ -113,7 +113,7 @@ impl Plan {
         }
     }
 
-    /// Whether a condition acts on a face.
+    /// Returns true if a condition acts on a face.
     fn acts(&self, problem: &Problem, condition: usize, face: Face) -> bool {
         let named = &self.named[condition];
         match problem.conditions[condition].surface() {
@@ -127,7 +127,7 @@ impl Plan {
 }
 
 impl System {
-    /// Of the elements that are born, those whose entry in `born` is not [`NONE`], by so many births.
+    /// Assembles the elements that are born (entry in `born` not [`NONE`]) after `births` births.
     ///
     /// # Errors
     /// [`Error::Mesh`] for an inverted element.
@@ -170,12 +170,12 @@ impl System {
         Ok(system)
     }
 
-    /// Elements of an equation's node that are born, ascending, and its number in each.
+    /// Born elements of an equation's node, ascending, with the local number of the node.
     pub fn around(&self, equation: u32, born: &[u32]) -> impl Iterator<Item = (u32, usize)> {
         self.plan.around.of(self.nodes()[equation as usize], born)
     }
 
-    /// ρV of a point at a node, kg.
+    /// Mass ρV of a point at a node, kg.
     pub fn mass(&self, problem: &Problem, born: &[u32], equation: usize, point: usize) -> f64 {
         let Nodal { birth, material, mass, weighed, like, .. } = &self.nodal;
         if *weighed {
@@ -193,7 +193,7 @@ impl System {
         sum
     }
 
-    /// Adds elements, ascending, that are born with the last of so many births.
+    /// Adds elements, ascending, that appear with the last of `births` births.
     ///
     /// # Errors
     /// [`Error::Mesh`] for an inverted element.
@@ -226,7 +226,7 @@ impl System {
         }
         fresh.sort_unstable();
         let new_fresh = |equation: u32| fresh.binary_search(&equation).is_ok();
-        // consistent matrices of faces are in no order that new ones could be added to
+        // face matrices of consistent capacity have no order that allows additions
         if self.consistent && old > 0 {
             self.equation.iter().filter(|equation| **equation != NONE).for_each(|&e| touched.add(e));
         }
@@ -282,14 +282,14 @@ impl System {
         Ok(added)
     }
 
-    /// Rows of the equations that are touched.
+    /// Assembles the rows of touched equations.
     fn connect(&mut self, mesh: &Mesh, born: &[u32], size: usize, touched: &Touched) {
         let Self { rows, plan, equation, .. } = self;
         let Plan { around, kinds, classes, numbering, .. } = plan;
         rows.update(size, &touched.list, |index, row: &mut Row| {
             let around = || around.of(numbering.nodes[index], born);
-            // corners, classes and relative nodes of the elements around say all, but for elements of no
-            // class
+            // corners, classes and relative nodes of the surrounding elements determine a row, except for
+            // elements outside all classes
             let repeated = row.begin(around().flat_map(|(element, corner)| {
                 let here = [corner as u32, u32::from(kinds[element as usize])];
                 let others = mesh.nodes(element).iter();
@@ -312,8 +312,8 @@ impl System {
         });
     }
 
-    /// Adds, at equations that are touched, what elements of no class have of their own, and the capacity of
-    /// all; returns ∫ N dV of each first-order element with a source.
+    /// Adds, at touched equations, elements outside all classes, and the capacity of all; returns ∫ N dV of
+    /// each first-order element with a source.
     fn add_elements(
         &mut self,
         problem: &Problem,
@@ -381,7 +381,7 @@ impl System {
         Ok(volumes)
     }
 
-    /// Conduction and capacity of one element, in rows that are touched.
+    /// Adds conduction and capacity of one element to touched rows.
     fn add_own<const N: usize>(
         &mut self,
         nodes: &[u32],
@@ -400,7 +400,7 @@ impl System {
         }
     }
 
-    /// Conditions on the outer surface and sources, at equations that are touched.
+    /// Updates conditions on the outer surface, and sources, at touched equations.
     fn act(
         &mut self,
         problem: &Problem,

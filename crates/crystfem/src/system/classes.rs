@@ -1,18 +1,18 @@
-//! First-order elements of equal shape and material, whose matrices are made once.
+//! Classes of first-order elements with equal shape and material, whose matrices are computed once.
 
 use super::Behaviour;
 use crate::element::{Geometry, MOST};
 use crate::mesh::Mesh;
 
-/// Classes at most; later shapes get matrices of their own.
+/// Limit on classes; further shapes get their own matrices.
 const MOST_CLASSES: usize = 256;
 
-/// The element's conduction is constant, and its matrix its own.
+/// Marks an element with constant conduction and its own matrix.
 pub const OWN: u16 = u16::MAX;
-/// The element's conduction depends on temperature or state.
+/// Marks an element whose conduction depends on temperature or state.
 pub const VARYING: u16 = u16::MAX - 1;
 
-/// Matrices of elements that differ by a translation only, to 1e-10 of their size.
+/// Matrices of elements that differ only by a translation, to 1e-10 of their size.
 pub struct Class {
     material: u16,
     nodes: usize,
@@ -20,13 +20,13 @@ pub struct Class {
     tolerance: f64,
     /// ∫ ∇N·k∇N dV, W/K.
     pub conduction: [[f64; MOST]; MOST],
-    /// ∫ ρ c N N dV, J/K; zero where the material is not linear.
+    /// ∫ ρ c N N dV, J/K; zero for materials that are not linear.
     pub capacity: [[f64; MOST]; MOST],
     /// ∫ N dV, m³.
     pub volumes: [f64; MOST],
 }
 
-/// The class of each element that ever exists, or [`OWN`] or [`VARYING`].
+/// Returns the class of each element that ever exists, or [`OWN`] or [`VARYING`], and the classes.
 pub fn classify(mesh: &Mesh, material_of: &[u16], behaviours: &[Behaviour]) -> (Vec<u16>, Vec<Class>) {
     let mut classes: Vec<Class> = Vec::new();
     let mut last = 0;
@@ -89,7 +89,7 @@ impl Class {
     }
 }
 
-/// Conduction (W/K) and capacity (J/K) of an element; zero what is not constant.
+/// Conduction (W/K) and capacity (J/K) of an element; zero if not constant.
 pub fn matrices<const N: usize, const P: usize>(
     geometry: &Geometry<N, P>,
     behaviour: &Behaviour,

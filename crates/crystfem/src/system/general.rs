@@ -1,16 +1,16 @@
-//! Material points in elements, for materials whose conductivity depends on temperature or state, and for all
-//! materials that are not linear when capacity is consistent.
+//! Material points in elements, for materials whose conductivity depends on temperature or state, and with
+//! consistent capacity for all materials that are not linear.
 //!
-//! Point g has the temperature gradient of Gauss point g. With lumped capacity it has the temperature of
-//! corner g beside it, and its energy is counted there; with consistent capacity it has the temperature of
-//! the Gauss point. The matrix takes the symmetric part of −∂f/∂(∇T) and leaves ∂f/∂T out, so that it stays
-//! symmetric: Newton's iteration then converges linearly where k varies, with a rate of the relative change
-//! of k over the last iterate.
+//! Point g has the temperature gradient of Gauss point g. With lumped capacity it has the temperature of the
+//! adjacent corner g, and its energy is counted there; with consistent capacity it has the temperature of the
+//! Gauss point. The matrix contains the symmetric part of −∂f/∂(∇T) without ∂f/∂T, so that it stays
+//! symmetric: with varying k Newton's iteration then converges linearly, at a rate given by the relative
+//! change of k over the last iterate.
 //!
-//! Where k jumps, that iteration stalls, and k at points would make the flux of an element depend on which of
-//! its points the jump has passed. There the flux is −D ∇θ with Kirchhoff's θ = ∫k dT at the nodes (Carslaw &
-//! Jaeger, §1.6), exact at nodes of a line at rest; its tangent ∇N_a·D∇N_b k(T_b) is complete, and not
-//! symmetric.
+//! If k jumps, that iteration stalls, and with k at points the flux of an element would depend on which of
+//! its points the jump has passed. The flux is then −D ∇θ with Kirchhoff's θ = ∫k dT at the nodes (Carslaw &
+//! Jaeger, §1.6), exact at the nodes of a line at steady state; its tangent ∇N_a·D∇N_b k(T_b) is complete,
+//! and not symmetric.
 
 use super::rows::Rows;
 use super::{Evaluation, Moves, NONE, Points, StepInput};
@@ -22,28 +22,29 @@ use crate::problem::Problem;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-/// Elements of a work item, and work items evaluated before their sums are added.
+/// Number of elements of a work item.
 const ITEM: usize = 256;
+/// Number of elements evaluated before their sums are added.
 const BATCH: usize = 64 * ITEM;
 
-/// Elements with points.
+/// Elements with material points.
 #[derive(Clone, Debug, Default)]
 pub struct General {
     /// Elements of the mesh, ascending.
     pub elements: Vec<u32>,
     /// First point of each element, and the number of points.
     pub starts: Vec<u32>,
-    /// Equations of all elements' nodes.
+    /// Equations of all elements' nodes, element by element.
     pub equations: Vec<u32>,
-    /// Where those of each element end.
+    /// End of each element's equations.
     pub ends: Vec<u32>,
     /// State variables stored for each point.
     pub stride: usize,
-    /// Whether a flux follows Kirchhoff's potential: the tangent is then not symmetric.
+    /// True if a flux follows Kirchhoff's potential: the tangent is then not symmetric.
     pub potential: bool,
 }
 
-/// What an element adds.
+/// Contribution of an element.
 struct Part<const N: usize> {
     change: [f64; N],
     rate: [f64; N],
@@ -54,12 +55,12 @@ struct Part<const N: usize> {
 }
 
 impl General {
-    /// None, with room for so many state variables at a point.
+    /// Returns an empty set with `stride` state variables a point.
     pub fn new(stride: usize) -> Self {
         Self { starts: vec![0], stride, ..Self::default() }
     }
 
-    /// Adds elements, ascending. Returns where points were from the first that may have moved.
+    /// Inserts elements, ascending; returns the moves of points.
     pub fn insert(&mut self, mesh: &Mesh, new: &[u32], equation: &[u32]) -> Moves {
         let first =
             new.first().map_or(self.elements.len(), |least| self.elements.partition_point(|e| e < least));
@@ -90,7 +91,7 @@ impl General {
         moves
     }
 
-    /// Whether there is none.
+    /// Returns true without points.
     pub fn is_empty(&self) -> bool {
         self.elements.is_empty()
     }
@@ -217,7 +218,7 @@ impl General {
             matrices: at.tangent.then(|| Box::new([[[0.0; N]; N]; 2])),
             ratio: None,
         };
-        // Kirchhoff's potential and k at the nodes, where the flux follows it
+        // Kirchhoff's potential and k at the nodes, if the flux follows it
         let mut potential = [[0.0; 2]; N];
         let mut kirchhoff = false;
         for a in 0..nodes {

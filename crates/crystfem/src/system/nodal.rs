@@ -1,8 +1,8 @@
-//! Material points at nodes: one for each node, material and birth, for materials with constant conductivity.
+//! Material points at nodes, for materials with constant conductivity: one for each node, material and birth.
 //!
-//! All corners of elements of one material that were born together have one temperature history at a node,
-//! hence one state, whatever parts of these elements the material fills; a mesh of hexahedra needs an eighth
-//! of the calls that its Gauss points would need.
+//! At a node all elements of one material and birth share one temperature history, hence one state, whatever
+//! fraction of them the material fills; a mesh of hexahedra needs an eighth of the calls that Gauss points
+//! would need.
 
 use super::vector::{CHUNK, items};
 use super::{Behaviour, Evaluation, Moves, NONE, Points, StepInput};
@@ -17,34 +17,35 @@ use std::sync::Arc;
 /// Points at nodes, in the order of the nodes.
 #[derive(Clone, Debug, Default)]
 pub struct Nodal {
-    /// First point of each node, and the number of points.
+    /// First point of each node, and at the end the number of points.
     pub starts: Vec<u32>,
     /// Material of each point, one of `like`.
     pub material: Vec<u16>,
     /// Birth of each point.
     pub birth: Vec<u32>,
-    /// ρV, kg; empty where energies are linear and all elements are of a class: see [`super::System::mass`].
+    /// Mass ρV, kg; empty if energies are linear and all elements belong to a class: see
+    /// [`super::System::mass`].
     pub mass: Vec<f64>,
-    /// Whether that is stored.
+    /// True if masses are stored.
     pub weighed: bool,
-    /// State variables stored for each point.
+    /// Number of state variables of a point.
     pub stride: usize,
-    /// Of each material: whether its energy is linear, so that its state only follows the temperature.
+    /// Followers: materials with linear energy, whose state follows the temperature without effect on it.
     pub followers: Vec<bool>,
-    /// Whether some material's energy is not, so that energies are stored.
+    /// True if energies are stored, for materials whose energy is not linear.
     pub energies: bool,
-    /// Whether one of these has a point.
+    /// True if a point has such a material.
     pub coupled: bool,
-    /// Laws of crystals of materials whose state follows, and of each material its law.
+    /// Laws of crystallization of followers.
     pub laws: Vec<Crystallization>,
-    /// See `laws`.
+    /// Index in `laws` of each material.
     pub law_of: Vec<Option<u16>>,
-    /// Of each material the first one that has the same states, whatever part of the elements it fills: they
-    /// share points.
+    /// First material with the same states, for each material, whatever fraction of the elements it fills:
+    /// they share points.
     pub like: Vec<u16>,
 }
 
-/// Room for one work item of [`Nodal::follow`].
+/// Buffers for one work item of [`Nodal::follow`].
 #[derive(Default)]
 struct PointScratch {
     /// Points of one law, and their nodes, both within the item.
@@ -56,7 +57,7 @@ struct PointScratch {
 }
 
 impl Nodal {
-    /// No points; the laws of the materials whose state follows.
+    /// Returns an empty set with the laws of the followers.
     pub fn laws_of(problem: &Problem, behaviours: &[Behaviour]) -> Self {
         let mut laws: Vec<Crystallization> = Vec::new();
         let mut law = |(material, behaviour): (&Arc<dyn ThermalMaterial>, &Behaviour)| {
@@ -77,7 +78,7 @@ impl Nodal {
         Self { laws, law_of, like, ..Self::default() }
     }
 
-    /// Whether there is none.
+    /// Returns true without points.
     pub fn is_empty(&self) -> bool {
         self.material.is_empty()
     }
@@ -87,14 +88,13 @@ impl Nodal {
         if self.is_empty() { 0..0 } else { self.starts[node] as usize..self.starts[node + 1] as usize }
     }
 
-    /// Whether the state of a material only follows the temperature.
+    /// Returns true for a follower.
     pub fn follows(&self, material: u16) -> bool {
         self.followers.get(usize::from(material)).is_some_and(|&follows| follows)
     }
 
-    /// Makes the points of these equations anew, ascending, and of all others up to `size`; `keys` gives
-    /// birth and material of those that a node has. Those have no mass yet. Returns where points were from
-    /// the first that may have moved.
+    /// Rebuilds the points of `changed` equations, ascending, and of all new ones up to `size`; `keys` lists
+    /// birth and material of the points of a node. New points have no mass yet. Returns the moves of points.
     pub fn replace(
         &mut self,
         size: usize,
@@ -139,7 +139,7 @@ impl Nodal {
         moves
     }
 
-    /// Of materials whose energy is not linear: adds to `change`, `capacity`; sets the new points.
+    /// Evaluates materials whose energy is not linear: adds to `change` and `capacity`, sets the new points.
     pub fn evaluate(
         &self,
         problem: &Problem,
@@ -154,7 +154,7 @@ impl Nodal {
         Ok(())
     }
 
-    /// Of the others: what they are, in the place of what they were to be.
+    /// Restores the states of followers in `new` from `old`.
     pub fn keep_followers(&self, old: &Points, new: &mut Points) {
         let Points { state, energy } = new;
         if !self.coupled {
@@ -169,8 +169,8 @@ impl Nodal {
         }
     }
 
-    /// Of the others: takes `states` to the end of the increment; returns their smallest wish for the next
-    /// step over this one, and how many there are.
+    /// Integrates the followers over the increment; returns the smallest requested ratio of next to present
+    /// step, and the number of points.
     pub fn follow(
         &self,
         problem: &Problem,

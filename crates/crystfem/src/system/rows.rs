@@ -1,12 +1,12 @@
-//! The conduction matrix (and the consistent capacity matrix) row by row, each distinct list of distances and
-//! of values stored once.
+//! Conduction matrix (and consistent capacity matrix) by rows, with each distinct list of offsets and of
+//! values stored once.
 //!
-//! A row is a list of distances, column − row, and a list of values. On a mesh with lines of equal elements
+//! A row is a list of offsets, column − row, and a list of values. On a mesh with lines of equal elements
 //! most consecutive rows are equal; a run of them is one segment, y_i = Σ_k v_k x_{i+o_k}, a stencil without
-//! any indices to gather. Elsewhere this is plain compressed rows: cells that a path fills in part have few
-//! distinct lists, which caches hold. Each row is written once: no colouring and no sums between threads, so
-//! the bits do not depend on them; gathering costs nothing over scattering because a stencil has 27 products
-//! where the elements around a node have 64.
+//! index gathers. Otherwise this is a compressed row format, and partly filled cells have few distinct lists,
+//! which stay in caches. Each row is written once, without colouring or sums across threads, so that the bits
+//! do not depend on threads; the cost equals that of scattering because a stencil has 27 products and the
+//! elements around a node have 64.
 
 mod product;
 mod stencils;
@@ -18,7 +18,7 @@ use pulp::Arch;
 use rayon::prelude::*;
 use stencils::{Entries, Stencil, Stencils};
 
-/// Consecutive equal rows of one work item; the first is counted within it.
+/// A run of equal rows of one work item; `start` counts within the item.
 #[derive(Clone, Copy, Debug)]
 struct Segment {
     start: u16,
@@ -26,14 +26,14 @@ struct Segment {
     stencil: Stencil,
 }
 
-/// One row under construction.
+/// A row under construction.
 #[derive(Debug, Default)]
 pub struct Row {
     entries: Vec<(i32, f64, f64)>,
-    /// The same, sorted, list by list.
+    /// The entries, sorted, list by list.
     offsets: Vec<i32>,
     values: [Vec<f64>; 2],
-    /// Whether the row has entries that are set later, so that it cannot be shared.
+    /// True if the row has entries that are set later, and so cannot be shared.
     pub own: bool,
     key: Vec<u32>,
     new_key: Vec<u32>,
@@ -41,8 +41,8 @@ pub struct Row {
 }
 
 impl Row {
-    /// Begins a row by what determines it. True where that is the same as for the row before: nothing needs
-    /// to be added then.
+    /// Begins a row with its determinants. Returns true if they equal those of the row before: then nothing
+    /// needs to be added.
     pub fn begin(&mut self, determinants: impl Iterator<Item = u32>) -> bool {
         self.new_key.clear();
         // iterated from within: chains of iterators are slow from outside
@@ -57,7 +57,7 @@ impl Row {
         self.repeated
     }
 
-    /// Sorts what was added.
+    /// Sorts the added entries.
     fn sorted(&mut self, consistent: bool) -> Entries<'_> {
         let Self { entries, offsets, values: [conduction, capacity], .. } = self;
         entries.sort_unstable_by_key(|entry| entry.0);
@@ -70,7 +70,7 @@ impl Row {
         Entries { offsets, conduction, capacity }
     }
 
-    /// Adds to the entry at a distance from the diagonal.
+    /// Adds to the entry at an offset from the diagonal.
     pub fn add(&mut self, offset: i32, conduction: f64, capacity: f64) {
         match self.entries.iter_mut().find(|entry| entry.0 == offset) {
             Some(entry) => {
@@ -82,25 +82,25 @@ impl Row {
     }
 }
 
-/// The matrices K and, with consistent capacity, M, over the nodes that exist.
+/// Matrices K and, with consistent capacity, M, over the existing nodes.
 #[derive(Clone, Debug)]
 pub struct Rows {
     size: usize,
     consistent: bool,
-    /// Runs of equal rows of each work item, as long as they can be.
+    /// Longest runs of equal rows of each work item.
     segments: Vec<Vec<Segment>>,
     stencils: Stencils,
-    /// Stencil of each row that has values of its own; empty where no row has.
+    /// Stencil of each row with its own values; empty without such rows.
     own: Vec<Stencil>,
-    /// Values without what is added in each evaluation.
+    /// Values without the contributions of each evaluation.
     base: Option<[Vec<f64>; 2]>,
-    /// Counts changes of the pattern, and of values.
+    /// Version of the pattern, and of the values.
     versions: [u64; 2],
-    /// The versions in which each work item last changed.
+    /// Versions in which each work item last changed.
     changed: Vec<[u64; 2]>,
 }
 
-/// The diagonal of rows, made anew where they or the factors of M and K have changed.
+/// Diagonal of the rows, recomputed when they or the factors of M and K have changed.
 #[derive(Default)]
 pub struct Diagonal {
     values: Vec<f64>,
@@ -108,7 +108,7 @@ pub struct Diagonal {
 }
 
 impl Diagonal {
-    /// That of `weights[0]`·M + `weights[1]`·K.
+    /// Returns the diagonal of `weights[0]`·M + `weights[1]`·K.
     pub fn of(&mut self, rows: &Rows, weights: [f64; 2]) -> &[f64] {
         let made_for = Some((rows.versions, weights.map(f64::to_bits)));
         if self.made_for != made_for {
@@ -121,23 +121,23 @@ impl Diagonal {
     }
 }
 
-/// Rows of a run on average where runs count as short.
+/// Largest mean length of runs that count as short.
 const MOST_ALONE: usize = 4;
-/// A list that has no name yet.
+/// Marks a list that has no number yet.
 const UNNAMED: u32 = u32::MAX;
-/// The part of the entries that may be of stencils that no row has.
+/// Reciprocal of the fraction of entries that may belong to unused stencils.
 const MOST_DEAD: usize = 4;
-/// Rows for each distinct one at least where distinct ones count as few.
+/// Smallest ratio of rows to distinct ones that count as few.
 const FEW: usize = 4;
 
-/// New rows of one work item: runs with stencils of their own numbering, and whether each is a row's own.
+/// New rows of one work item: runs with locally numbered stencils, and true for rows with their own values.
 struct Part {
     runs: Vec<(Segment, bool)>,
     stencils: Stencils,
 }
 
 impl Rows {
-    /// None.
+    /// Returns an empty matrix.
     pub fn new(consistent: bool) -> Self {
         Self {
             size: 0,
@@ -161,28 +161,28 @@ impl Rows {
         self.segments.len()
     }
 
-    /// What changes with the pattern, and what changes with the values.
+    /// Versions of the pattern and of the values.
     pub fn versions(&self) -> [u64; 2] {
         self.versions
     }
 
-    /// The same of the rows of one work item.
+    /// Versions of the rows of one work item.
     pub fn versions_of(&self, item: usize) -> [u64; 2] {
         self.changed[item]
     }
 
-    /// Whether most rows of a work item stand alone.
+    /// Returns true if most rows of a work item differ from their neighbours.
     pub fn is_unequal(&self, item: usize) -> bool {
         let rows = (self.size - item * CHUNK).min(CHUNK);
         MOST_ALONE * self.segments[item].len() > rows
     }
 
-    /// Whether the distinct rows are so few that caches hold them, however they alternate.
+    /// Returns true if distinct rows are few enough for caches, however they alternate.
     pub fn are_few(&self) -> bool {
         FEW * self.stencils.values.used <= self.size
     }
 
-    /// Of `size` rows; `fill` begins each row and says what is in it.
+    /// Builds `size` rows; `fill` begins each row and adds its entries.
     #[cfg(test)]
     pub fn build(size: usize, consistent: bool, fill: impl Fn(usize, &mut Row) + Sync) -> Self {
         let mut rows = Self::new(consistent);
@@ -190,9 +190,9 @@ impl Rows {
         rows
     }
 
-    /// Makes these rows, ascending, and empty ones up to `size`; `fill` begins each row and says what is in
-    /// it. Other rows stay. What it leaves depends on the rows alone, not on how they came about, but for
-    /// stencils that no row has any more.
+    /// Rebuilds the `changed` rows, ascending, and adds empty ones up to `size`; `fill` begins each row and
+    /// adds its entries. Other rows stay. The result depends on the rows alone, not on their history, except
+    /// for unused stencils.
     pub fn update(&mut self, size: usize, changed: &[u32], fill: impl Fn(usize, &mut Row) + Sync) {
         let Stencils { values, patterns, .. } = &self.stencils;
         if values.dead + patterns.dead > (values.entries() / MOST_DEAD).max(self.size) {
@@ -274,7 +274,7 @@ impl Rows {
         self.stencils.values.hold(stencil.values, length);
     }
 
-    /// Drops lists that no row has.
+    /// Drops unused lists.
     fn compact(&mut self) {
         let old = std::mem::take(&mut self.stencils);
         let base = self.base.take();
@@ -309,20 +309,20 @@ impl Rows {
         self.base = kept;
     }
 
-    /// Lists of values that rows have, segments of equal rows, and entries of K in these lists: of the rows
-    /// alone, not of how they came about.
+    /// Number of lists of values, of segments of equal rows, and of entries of K in these lists; independent
+    /// of the history.
     pub fn stored(&self) -> [usize; 3] {
         let Stencils { values, .. } = &self.stencils;
         [values.used, self.segments.iter().map(Vec::len).sum(), values.entries() - values.dead]
     }
 
-    /// Bytes of what is stored.
+    /// Bytes of memory.
     pub fn bytes(&self) -> usize {
         let segments: usize = self.segments.iter().map(Vec::len).sum();
         segments * size_of::<Segment>() + self.own.len() * size_of::<Stencil>() + self.stencils.bytes()
     }
 
-    /// Adds to an entry of a row of its own; without effect elsewhere.
+    /// Adds to an entry of a row with its own values; without effect on other rows.
     pub fn add(&mut self, row: usize, column: usize, conduction: f64, capacity: f64) {
         let Some(&Stencil { pattern, values }) = self.own.get(row).filter(|own| **own != Stencil::NONE)
         else {
@@ -341,8 +341,7 @@ impl Rows {
         }
     }
 
-    /// Takes the values of rows that are new since the last call as those to which [`Self::restore`] sets
-    /// them.
+    /// Saves the values of new rows, to which [`Self::restore`] returns them.
     pub fn keep(&mut self) {
         let base = self.base.get_or_insert_default();
         let Stencils { conduction, capacity, .. } = &self.stencils;
@@ -351,7 +350,7 @@ impl Rows {
         }
     }
 
-    /// Sets the values back to what they were.
+    /// Restores the saved values.
     pub fn restore(&mut self) {
         if let Some([conduction, capacity]) = &self.base {
             self.stencils.conduction.copy_from_slice(conduction);
@@ -371,7 +370,7 @@ impl Rows {
         });
     }
 
-    /// The largest of `of(row, K_ii)`.
+    /// Returns the largest of `of(row, K_ii)`.
     pub fn largest(&self, of: impl Fn(usize, f64) -> f64 + Sync) -> f64 {
         let item = |(item, segments): (usize, &Vec<Segment>)| {
             let mut most = f64::NEG_INFINITY;
@@ -393,7 +392,7 @@ impl Rows {
         self.row(row, [0.0; 2]).map(|(column, _)| column)
     }
 
-    /// Entries (column, value) of a row of `capacity`·M + `conduction`·K, columns ascending.
+    /// Entries (column, value) of a row of `weights[0]`·M + `weights[1]`·K, columns ascending.
     pub fn row(&self, row: usize, weights: [f64; 2]) -> impl Iterator<Item = (usize, f64)> + '_ {
         let stencil = self.segment(row).map(|segment| segment.stencil);
         let offsets = stencil.map_or(&[][..], |stencil| self.stencils.offsets(stencil.pattern));
@@ -403,7 +402,7 @@ impl Rows {
             .map(move |(at, &offset)| (row.wrapping_add_signed(offset as isize), self.value(at, weights)))
     }
 
-    /// The run that a row belongs to.
+    /// Run of a row.
     fn segment(&self, row: usize) -> Option<&Segment> {
         let segments = self.segments.get(row / CHUNK)?;
         let next = segments.partition_point(|segment| usize::from(segment.start) <= row % CHUNK);
@@ -418,18 +417,19 @@ impl Rows {
         }
     }
 
-    /// y = diagonal·x + (`weights[0]`·M + `weights[1]`·K) x; returns x·y, summed in the order of the items.
+    /// Computes y = diagonal·x + (`weights[0]`·M + `weights[1]`·K) x; returns x·y, summed in the order of the
+    /// items.
     pub fn product(&self, diagonal: Option<&[f64]>, weights: [f64; 2], x: &[f64], y: &mut [f64]) -> f64 {
         self.multiply::<false>(diagonal, weights, x, y)
     }
 
-    /// y = K x as Σ_j K_ij (x_j − x_i): rows of K add up to nothing. Its rounding is that of the differences,
-    /// so that heat is conserved to rounding of what flows, not of what is stored.
+    /// Computes y = K x as Σ_j K_ij (x_j − x_i): rows of K sum to zero. Rounding is that of the differences,
+    /// so that heat is conserved relative to the heat flow, not to the stored heat.
     pub fn flow(&self, x: &[f64], y: &mut [f64]) {
         self.multiply::<true>(None, [0.0, 1.0], x, y);
     }
 
-    /// [`Self::flow`] of x, and M u of the consistent capacity.
+    /// Computes [`Self::flow`] of x, and M u of the consistent capacity.
     pub fn flow_and_capacity(&self, x: &[f64], u: &[f64], flow: &mut [f64], stored: &mut [f64]) {
         flow.par_chunks_mut(CHUNK).zip(stored.par_chunks_mut(CHUNK)).enumerate().for_each(
             |(item, (flow, stored))| {
@@ -450,7 +450,7 @@ impl Rows {
         ordered_sum(y.par_chunks_mut(CHUNK).enumerate().map(part))
     }
 
-    /// [`Self::product`], or the flow, of the rows of one work item, `y`.
+    /// Multiplies the rows of one work item, by [`Self::product`] or as a flow.
     pub fn part<const FLOW: bool>(
         &self,
         item: usize,
@@ -465,7 +465,7 @@ impl Rows {
 }
 
 impl Segment {
-    /// Its rows, within the work item.
+    /// Rows, within the work item.
     #[inline(always)]
     fn rows(self) -> std::ops::Range<usize> {
         let start = self.start as usize;
@@ -474,7 +474,7 @@ impl Segment {
 }
 
 impl Part {
-    /// Of rows of one work item, ascending.
+    /// Builds the rows of one work item, ascending.
     fn new(changed: &[u32], consistent: bool, fill: &(impl Fn(usize, &mut Row) + Sync)) -> Self {
         let mut part = Self { runs: Vec::new(), stencils: Stencils::default() };
         let mut row = Row::default();

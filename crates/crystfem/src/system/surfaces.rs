@@ -1,7 +1,7 @@
-//! Flux, film, radiation and sources on what exists.
+//! Flux, film, radiation and sources on existing elements.
 //!
-//! With lumped capacity they act at nodes, q(T_i) ∮ N_i dA, so that their tangent is diagonal and no cold
-//! neighbour can heat a node; with consistent capacity they act at the Gauss points of faces.
+//! With lumped capacity they act at nodes, q(T_i) ∮ N_i dA: the tangent is diagonal, and no cold neighbour
+//! can heat a node. With consistent capacity they act at the Gauss points of faces.
 
 use super::{Evaluation, StepInput};
 use crate::boundary::{Condition, STEFAN_BOLTZMANN};
@@ -9,31 +9,31 @@ use crate::element::FaceGeometry;
 use crate::mesh::Face;
 use crate::problem::Problem;
 
-/// Heat that goes into the body, by kind: W, or J when summed over time.
+/// Heat into the body, by kind: W, or J when integrated over time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Exchange {
-    /// Through prescribed flux.
+    /// Heat by prescribed flux.
     pub flux: f64,
-    /// Through films.
+    /// Heat by films.
     pub film: f64,
-    /// Through radiation.
+    /// Heat by radiation.
     pub radiation: f64,
-    /// From sources.
+    /// Heat of sources.
     pub source: f64,
 }
 
 impl Exchange {
-    /// The sum of all.
+    /// Sum of all kinds.
     pub fn total(&self) -> f64 {
         self.flux + self.film + self.radiation + self.source
     }
 
-    /// The sum of all magnitudes.
+    /// Sum of all magnitudes.
     pub fn gross(&self) -> f64 {
         self.flux.abs() + self.film.abs() + self.radiation.abs() + self.source.abs()
     }
 
-    /// Adds a multiple of another.
+    /// Adds a multiple of another exchange.
     pub fn add(&mut self, factor: f64, other: &Self) {
         self.flux += factor * other.flux;
         self.film += factor * other.film;
@@ -42,34 +42,34 @@ impl Exchange {
     }
 }
 
-/// ∂Q/∂T of faces, W/K, face after face.
+/// Tangents ∂Q/∂T of faces, W/K, face by face.
 #[derive(Clone, Debug, Default)]
 pub struct FaceMatrices {
-    /// Nodes of each face.
+    /// Number of nodes of each face.
     nodes: Vec<u8>,
     equations: Vec<u32>,
     values: Vec<f64>,
 }
 
-/// ∂Q/∂T of one face, W/K.
+/// Tangent ∂Q/∂T of one face, W/K.
 #[derive(Clone, Copy, Debug)]
 pub struct FaceMatrix<'a> {
-    /// Equations of its nodes.
+    /// Equations of the nodes.
     pub equations: &'a [u32],
-    /// Row after row.
+    /// Values, row by row.
     pub values: &'a [f64],
 }
 
 impl FaceMatrices {
-    /// None.
+    /// Empty list.
     pub const NONE: &'static Self = &Self { nodes: Vec::new(), equations: Vec::new(), values: Vec::new() };
 
-    /// Whether there is none.
+    /// Returns true if there are no faces.
     pub fn is_empty(&self) -> bool {
         self.nodes.is_empty()
     }
 
-    /// Each face.
+    /// Iterates over the faces.
     pub fn iter(&self) -> impl Iterator<Item = FaceMatrix<'_>> {
         let (mut equations, mut values) = (self.equations.as_slice(), self.values.as_slice());
         self.nodes.iter().map(move |&nodes| {
@@ -89,7 +89,7 @@ impl FaceMatrices {
 }
 
 impl FaceMatrix<'_> {
-    /// y += factor · matrix · x.
+    /// Adds factor · matrix · x to y.
     pub fn add_product(&self, factor: f64, x: &[f64], y: &mut [f64]) {
         let nodes = self.equations.len();
         for (a, &row) in self.equations.iter().enumerate() {
@@ -119,22 +119,22 @@ impl<const N: usize, const P: usize> Acting<N, P> {
     }
 }
 
-/// Equations that take heat, those at which it is known, and ∮ N N dA, m², or ∫ N N dV, m³.
+/// Equation that takes heat, equation whose temperature sets it, and ∮ N N dA, m², or ∫ N N dV, m³.
 type Pairs = Vec<(u32, u32, f64)>;
 
-/// One condition on what exists.
+/// A condition on existing faces.
 #[derive(Clone, Debug, Default)]
 struct Part {
     condition: usize,
     radiates: bool,
     /// Equations with ∮ N dA, m², ascending.
     nodes: Vec<(u32, f64)>,
-    /// Equations that take a flux, those at which it is known, and ∮ N N dA, m²: of second-order faces, whose
-    /// ∮ N dA is negative at corners.
+    /// Equation that takes a flux, equation whose temperature sets it, and ∮ N N dA, m², of second-order
+    /// faces, whose ∮ N dA is negative at corners.
     pairs: Pairs,
     /// Faces, for film and radiation with consistent capacity.
     faces: Vec<Acting<4, 4>>,
-    /// Those of second order.
+    /// Second-order faces, likewise.
     wide: Vec<Acting<8, 9>>,
 }
 
@@ -142,14 +142,13 @@ struct Part {
 #[derive(Clone, Debug, Default)]
 pub struct Surfaces {
     parts: Vec<Part>,
-    /// Source, and equations with ∫ N dV, m³, ascending.
+    /// Source index, and equations with ∫ N dV, m³, ascending.
     sources: Vec<(usize, Vec<(u32, f64)>)>,
-    /// Source, equations that take its heat, those at which it is known, and ∫ N N dV, m³, of second-order
-    /// elements.
+    /// Source index, and pairs of equations with ∫ N N dV, m³, of second-order elements.
     wide_sources: Vec<(usize, Pairs)>,
 }
 
-/// Sorts by equation and adds equal ones, in the order given.
+/// Sorts by equation and sums equal ones in the given order.
 fn gather(mut list: Vec<(u32, f64)>) -> Vec<(u32, f64)> {
     list.sort_by_key(|entry| entry.0);
     list.dedup_by(|next, kept| {
@@ -162,7 +161,7 @@ fn gather(mut list: Vec<(u32, f64)>) -> Vec<(u32, f64)> {
     list
 }
 
-/// The same of pairs.
+/// Sorts pairs and sums equal ones in the given order.
 fn gather_pairs(mut list: Pairs) -> Pairs {
     list.sort_by_key(|entry| (entry.0, entry.1));
     list.dedup_by(|next, kept| {
@@ -175,37 +174,37 @@ fn gather_pairs(mut list: Pairs) -> Pairs {
     list
 }
 
-/// Equations whose elements became more.
+/// Set of equations that have gained elements.
 pub struct Touched {
-    /// Ascending, each once.
+    /// Equations, without duplicates, ascending after [`Self::sort`].
     pub list: Vec<u32>,
     marks: Vec<bool>,
 }
 
 impl Touched {
-    /// None of so many.
+    /// Returns an empty set for `size` equations.
     pub fn new(size: usize) -> Self {
         Self { list: Vec::new(), marks: vec![false; size] }
     }
 
-    /// Adds one.
+    /// Adds an equation.
     pub fn add(&mut self, equation: u32) {
         if !std::mem::replace(&mut self.marks[equation as usize], true) {
             self.list.push(equation);
         }
     }
 
-    /// After all are added.
+    /// Sorts the list, once all are added.
     pub fn sort(&mut self) {
         self.list.sort_unstable();
     }
 
-    /// Whether an equation is one.
+    /// Returns true if an equation is in the set.
     pub fn contains(&self, equation: u32) -> bool {
         self.marks[equation as usize]
     }
 
-    /// Puts new entries in the place of those that are touched.
+    /// Replaces the entries of touched equations.
     fn replace(&self, list: &mut Vec<(u32, f64)>, new: Vec<(u32, f64)>) {
         let Some(&first) = self.list.first() else { return };
         let tail = list.split_off(list.partition_point(|entry| entry.0 < first));
@@ -221,7 +220,7 @@ impl Touched {
 }
 
 impl Surfaces {
-    /// Of what does not exist yet.
+    /// Returns all conditions and sources, without faces and elements yet.
     pub fn new(problem: &Problem) -> Self {
         let surfaces = (0..problem.conditions.len()).filter(|&k| problem.conditions[k].surface().is_some());
         let part = |condition: usize| {
@@ -232,8 +231,8 @@ impl Surfaces {
         Self { parts: surfaces.map(part).collect(), sources, wide_sources: Vec::new() }
     }
 
-    /// Conditions at equations that are touched: on those of the faces there, which exist and are not
-    /// covered, on which one `acts`. With consistent capacity all equations are touched.
+    /// Updates conditions at touched equations, on those exposed `faces` there on which one `acts`. With
+    /// consistent capacity all equations are touched.
     pub fn act(
         &mut self,
         problem: &Problem,
@@ -279,8 +278,8 @@ impl Surfaces {
         }
     }
 
-    /// A source at equations that are touched, with ∫ N dV of its first-order elements' nodes and ∫ N N dV of
-    /// the others', which are never born.
+    /// Updates a source at touched equations, from ∫ N dV at the nodes of its first-order elements, and ∫ N N
+    /// dV of second-order ones, which are never born later.
     pub fn release(&mut self, source: usize, volumes: Vec<(u32, f64)>, pairs: Pairs, touched: &Touched) {
         touched.replace(&mut self.sources[source].1, volumes);
         if !pairs.is_empty() {
@@ -288,13 +287,13 @@ impl Surfaces {
         }
     }
 
-    /// Whether something radiates.
+    /// Returns true if a condition radiates.
     pub fn radiates(&self) -> bool {
         let acts = |part: &Part| !(part.nodes.is_empty() && part.faces.is_empty() && part.wide.is_empty());
         self.parts.iter().any(|part| part.radiates && acts(part))
     }
 
-    /// Whether a film has another coefficient at one time than at another: the matrix is another too.
+    /// Returns true if a film coefficient differs between two times, and with it the matrix.
     pub fn varies(&self, problem: &Problem, between: [f64; 2]) -> bool {
         self.parts.iter().any(|part| match &problem.conditions[part.condition] {
             Condition::Film { coefficient, .. } => coefficient.at(between[0]) != coefficient.at(between[1]),
@@ -302,7 +301,7 @@ impl Surfaces {
         })
     }
 
-    /// Adds to `rate`, `conductance`, `faces`; sets `exchange`.
+    /// Adds to `rate`, `conductance` and `faces`; sets `exchange`.
     pub fn evaluate(&self, problem: &Problem, nodes: &[u32], at: &StepInput, out: &mut Evaluation) {
         let mut exchange = Exchange::default();
         out.faces.clear();
@@ -329,7 +328,7 @@ impl Surfaces {
                 Condition::Radiation { emissivity, ambient, .. } => {
                     let ambient = ambient.at(at.time);
                     let (factor, fourth) = (emissivity * STEFAN_BOLTZMANN, ambient.powi(4));
-                    // odd continuation below 0 K, which iterates may visit
+                    // odd continuation below 0 K, which iterates may reach
                     exchange.radiation -= part.lose(at, out, |t| {
                         let cube = t.abs() * t * t;
                         (factor * (cube * t - fourth), 4.0 * factor * cube)
@@ -358,7 +357,7 @@ impl Surfaces {
 }
 
 impl Part {
-    /// Adds a heat loss (q, ∂q/∂T) of temperature; returns its sum, W.
+    /// Adds a heat loss (q, ∂q/∂T) that depends on temperature; returns its sum, W.
     fn lose(&self, at: &StepInput, out: &mut Evaluation, loss: impl Fn(f64) -> (f64, f64)) -> f64 {
         let mut total = 0.0;
         for &(equation, area) in &self.nodes {
@@ -373,7 +372,7 @@ impl Part {
 }
 
 impl<const N: usize, const P: usize> Acting<N, P> {
-    /// Adds to `rate` and `faces`; `total` with what it loses, W.
+    /// Adds to `rate` and `faces`, and the heat loss, W, to `total`.
     fn lose(
         &self,
         at: &StepInput,

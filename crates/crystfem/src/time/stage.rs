@@ -1,4 +1,4 @@
-//! One stage: E(T) − E(start) + a Q(T) + known = 0 at the free nodes.
+//! Stages: solve E(T) − E(start) + a Q(T) + known = 0 at the free nodes.
 
 use super::Work;
 use super::matrix::{Matrix, key};
@@ -11,15 +11,15 @@ use crate::solver::{
 use crate::system::vector::{combine, dot, largest, set, sum};
 use crate::system::{Evaluation, Memory, StepInput, System};
 
-/// Newton iterations at most.
+/// Limit on Newton iterations.
 const MOST_ITERATIONS: usize = 60;
-/// Halvings of a Newton step at most.
+/// Limit on halvings of a Newton step.
 const MOST_HALVINGS: usize = 7;
-/// Newton steps in a row, where k jumps, that are taken whole though the residual does not fall.
+/// Limit on consecutive full Newton steps at a jump of k while the residual does not fall.
 const MOST_FULL_STEPS: usize = 8;
-/// Corrections of the balance of a linear stage at most.
+/// Limit on balance corrections of a linear stage.
 const MOST_SHIFTS: usize = 3;
-/// Share of the heat moved that the sum of all residuals may be; the audit promises 1e-10.
+/// Largest sum of all residuals over the heat moved; the energy audit promises 1e-10.
 const BALANCED: f64 = 2e-11;
 
 /// Equation of a stage.
@@ -29,30 +29,30 @@ pub struct Stage<'a> {
     pub weight: f64,
     /// Length of the increment, s.
     pub dt: f64,
-    /// Time at its end, s.
+    /// Time at the end, s.
     pub time: f64,
-    /// Heat of former stages, J; empty for none.
+    /// Heat of earlier stages, J; empty for none.
     pub known: &'a [f64],
     /// Temperatures at the start, K.
     pub start: &'a [f64],
     /// Points at the start.
     pub old: &'a Memory,
-    /// Whether to give up.
+    /// Requests a stop.
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }
 
-/// Solves stages; keeps what does not change between them.
+/// Solver of stages, with cached matrices.
 #[derive(Default)]
 pub struct Stages {
     /// E, Q and tangents at the last temperature.
     pub evaluation: Evaluation,
-    /// E − E(start) + a Q + known at the last temperature, J, prescribed nodes included; a correction takes
-    /// it for its own.
+    /// E − E(start) + a Q + known at the last temperature, J, prescribed nodes included; also used as work
+    /// vector by corrections.
     pub residual: Vec<f64>,
-    /// What is wanted; factors and levels are made when first needed.
+    /// Requested method; factors and levels are made when first needed.
     pub method: Method,
     matrix: Cached<Matrix>,
-    /// Factors of the matrix; analysed for its build.
+    /// Factors of the matrix, with their analysis for the present build.
     factors: Cached<Option<Direct>>,
     iterative: Iterative,
     packed: Packed,
@@ -63,7 +63,7 @@ pub struct Stages {
 }
 
 impl Stages {
-    /// Forgets everything made for another system, but keeps the memory for it.
+    /// Invalidates everything made for another system, but keeps the memory.
     pub fn reset(&mut self) {
         (self.factors, self.iterative.multigrid) = Default::default();
         self.matrix.forget();
@@ -75,7 +75,7 @@ impl Stages {
         self.matrix.value.sensitivity
     }
 
-    /// The matrix of the last evaluation, unless it is still that of a linear system.
+    /// Computes the matrix of the last evaluation, unless a linear system has it already.
     fn prepare(&mut self, system: &System, weight: f64) {
         let key = key(system, weight);
         if !(self.matrix.is_for(key) && system.is_linear()) {
@@ -84,8 +84,8 @@ impl Stages {
         }
     }
 
-    /// Solves a stage; `temperature` is the first guess and becomes the solution, at which `evaluation` and
-    /// `residual` stand.
+    /// Solves a stage; `temperature` is the initial guess and becomes the solution, at which `evaluation` and
+    /// `residual` are valid.
     ///
     /// # Errors
     /// [`Error::NotConverged`], [`Error::NotFinite`].
@@ -107,7 +107,7 @@ impl Stages {
                 *t += correction;
             }
             self.evaluate(problem, system, stage, temperature, work)?;
-            // very long steps: what the linear solve believes left, and what is left, differ by rounding
+            // for very long steps the residual of the linear solve and the true one differ by rounding
             for _ in 0..MOST_SHIFTS {
                 if self.balanced(system, stage.weight) {
                     break;
@@ -134,13 +134,13 @@ impl Stages {
             }
             work.newton_iterations += 1;
             self.correct(problem, system, stage, (1e-3 * error).max(0.3 * tolerance), work)?;
-            // line search along the correction, by the norm of this iterate's matrix
+            // line search along the correction, in the norm of this iterate's matrix
             let inverse = std::mem::take(&mut self.matrix.value.inverse);
             let mut part = 1.0;
             let mut trial = std::mem::take(&mut self.trial);
             trial.resize(temperature.len(), 0.0);
-            // across a kink of a convex or concave balance whole steps come back by themselves, from one
-            // side; shorter ones creep towards the kink
+            // across a kink of a convex or concave balance full steps recover by themselves, from one side;
+            // shorter ones creep towards the kink
             if square < best.0 {
                 best = (square, iteration);
             }
@@ -174,8 +174,8 @@ impl Stages {
         })
     }
 
-    /// Solves A e = right with the matrix of the last stage, coarsely: the filter of the error estimate. The
-    /// result is the largest |e|, K.
+    /// Filters the error estimate: solves A e = right coarsely with the matrix of the last stage. Returns the
+    /// largest |e|, K.
     pub fn filter(
         &mut self,
         problem: &Problem,
@@ -241,7 +241,7 @@ impl Stages {
         Ok(())
     }
 
-    /// Levels of multigrid where they are wanted, for the matrix that is prepared.
+    /// Builds requested multigrid levels for the prepared matrix.
     fn raise(&mut self, problem: &Problem, system: &System, weight: f64, work: &mut Work) {
         if self.method != Method::Multigrid || !system.is_symmetric() {
             self.iterative.multigrid.value = None;
@@ -270,8 +270,8 @@ impl Stages {
         }
     }
 
-    /// The correction of temperature: A δ = −residual, and Σ(residual + A δ) = 0 over the free nodes to
-    /// rounding.
+    /// Computes the correction of temperature: A δ = −residual, with Σ(residual + A δ) = 0 over the free
+    /// nodes to rounding.
     fn correct(
         &mut self,
         problem: &Problem,
@@ -281,7 +281,7 @@ impl Stages {
         work: &mut Work,
     ) -> Result<(), Error> {
         let size = system.size();
-        // both are in the residual, and evaluated anew after the correction
+        // both are work vectors here, and evaluated again after the correction
         self.iterative.swap_vectors(&mut self.evaluation.change, &mut self.evaluation.rate);
         self.raise(problem, system, stage.weight, work);
         self.correction.resize(size, 0.0);
@@ -301,8 +301,7 @@ impl Stages {
                 self.factors.value = Direct::analyse(&operator, &system.free, place);
                 self.factors.forget();
             }
-            // without memory for factors, or with a matrix that is singular to rounding, the other method
-            // takes over
+            // without memory for factors, or with a matrix singular to rounding, the other method takes over
             if !(self.factors.is_for(key) && system.is_linear()) {
                 work.factorizations += 1;
                 if !self.factors.value.as_mut().is_some_and(|factors| factors.factor(&operator)) {
@@ -323,7 +322,7 @@ impl Stages {
             }
         }
         let symmetric = system.is_symmetric();
-        // 1·(r + A δ) by the sums of the columns, where the iterations know A to single precision only
+        // 1·(r + A δ) from column sums, as the iterations know A to single precision only
         let mut total = 0.0;
         let ended = if factored {
             Ended { iterations: 0, error: 0.0, converged: true }
@@ -365,7 +364,7 @@ impl Stages {
         Ok(())
     }
 
-    /// Returns whether the free nodes' residuals add up to nothing.
+    /// Returns true if the residuals of the free nodes sum to zero, within [`BALANCED`].
     fn balanced(&self, system: &System, weight: f64) -> bool {
         let size = system.size();
         let total = dot(&system.free, &self.residual);
@@ -388,7 +387,7 @@ fn limit(size: usize) -> usize {
     (10 * size + 100).min(100_000)
 }
 
-/// Packed rows of a symmetric matrix, where there are any.
+/// Packs the rows of a symmetric matrix; `None` if none are packed.
 fn pack<'a>(packed: &'a mut Packed, system: &System, weight: f64) -> Option<&'a Packed> {
     let weights = if system.consistent { [1.0, weight] } else { [0.0, 1.0] };
     (system.is_symmetric() && packed.update(&system.rows, weights)).then_some(packed)

@@ -1,4 +1,4 @@
-//! One step of a scheme, not yet accepted.
+//! Attempted steps of the schemes.
 
 use super::{Scheme, Stage, Stages, Work};
 use crate::error::Error;
@@ -6,9 +6,11 @@ use crate::problem::Problem;
 use crate::system::vector::set;
 use crate::system::{Evaluation, Exchange, Memory, StepInput, System};
 
-/// γ, and the weights w, w, d of TR-BDF2: 2 − √2, √2/4, √2/4, γ/2.
+/// γ of TR-BDF2, 2 − √2.
 const GAMMA: f64 = 2.0 - std::f64::consts::SQRT_2;
+/// Weight w = √2/4 of the first two rates.
 const W: f64 = 0.25 * std::f64::consts::SQRT_2;
+/// Weight d = γ/2 of the last rate.
 const D: f64 = 0.5 * GAMMA;
 
 /// State at the start of a step.
@@ -18,11 +20,11 @@ pub struct Start<'a> {
     pub time: f64,
     /// Temperatures, K.
     pub temperature: &'a [f64],
-    /// Their rates of change over the last step, K/s; empty after a jump.
+    /// Rates of change over the last step, K/s; empty after a jump.
     pub slope: &'a [f64],
-    /// Q, W; empty if not known.
+    /// Q, W; empty if unknown.
     pub rate: &'a [f64],
-    /// Heat going in, W.
+    /// Heat supplied, W.
     pub exchange: &'a Exchange,
     /// Material points.
     pub memory: &'a Memory,
@@ -35,16 +37,16 @@ pub struct Attempt {
     pub error: Option<f64>,
     /// Order of the error estimate in Δt.
     pub order: i32,
-    /// The smallest wish of a material for the next step over this one.
+    /// Smallest ratio of next to present step requested by a material.
     pub step_ratio: Option<f64>,
-    /// Heat that went in over the step, J.
+    /// Heat supplied over the step, J.
     pub exchange: Exchange,
 }
 
-/// Carries out steps. After an attempt, `temperature` and `stages` hold its end.
+/// Stepper; after an attempt, `temperature` and `stages` hold its end.
 #[derive(Default)]
 pub struct Stepper {
-    /// The last stage.
+    /// Last stage.
     pub stages: Stages,
     /// Temperatures at the end, K.
     pub temperature: Vec<f64>,
@@ -53,15 +55,15 @@ pub struct Stepper {
 }
 
 impl Stepper {
-    /// Forgets everything made for another system, but keeps the room for it.
+    /// Invalidates everything made for another system, but keeps the memory.
     pub fn reset(&mut self) {
         self.stages.reset();
     }
 
-    /// Q at the start, where a step needs it: after a jump nothing else knows it.
+    /// Computes Q at the start, if a step needs it and it is unknown after a jump.
     ///
     /// # Errors
-    /// Those of the materials.
+    /// Errors of the materials.
     pub fn rate(
         &mut self,
         problem: &Problem,
@@ -75,11 +77,11 @@ impl Stepper {
         Ok((evaluation.rate, evaluation.exchange))
     }
 
-    /// A step of length `dt`, which ends at `end`; the temporal error is estimated to a fraction of
+    /// Attempts a step of length `dt` that ends at `end`; the temporal error is estimated to a fraction of
     /// `accuracy`, if given.
     ///
     /// # Errors
-    /// Those of the stages.
+    /// Errors of the stages.
     #[allow(clippy::too_many_arguments)]
     pub fn attempt(
         &mut self,

@@ -1,14 +1,14 @@
-//! Rows times a vector: runs of equal rows by vectors of the processor, others one by one.
+//! Matrix-vector products: vectorized over runs of equal rows, row by row otherwise.
 
 use super::stencils::Stencil;
 use super::{Rows, Segment};
 use crate::system::vector::dot_simd;
 use pulp::{Simd, WithSimd};
 
-/// Entries of the longest row that the vector path takes.
+/// Longest row of the vectorized path.
 const MOST_ENTRIES: usize = 64;
 
-/// One work item of a product.
+/// Product of one work item.
 pub(super) struct Product<'a, const FLOW: bool> {
     pub rows: &'a Rows,
     pub segments: &'a [Segment],
@@ -34,7 +34,7 @@ impl<const FLOW: bool> WithSimd for Product<'_, FLOW> {
             if length >= S::F64_LANES && range.len() <= MOST_ENTRIES {
                 Runs { rows, segment, diagonal, y: &mut *y, first }.run::<S, FLOW>(simd, weights, x);
             } else {
-                // vectors of four reach one number further than a row whose columns come in threes
+                // vectors of four read one number past a row with columns in threes
                 let threes = stencils.in_threes(pattern)
                     && stencils.capacity.is_empty()
                     && range.end < stencils.conduction.len()
@@ -64,8 +64,8 @@ impl<const FLOW: bool> WithSimd for Product<'_, FLOW> {
     }
 }
 
-/// Σ v_j (x_j − `own`) of a row whose columns come in threes: vectors of four numbers, whose last one belongs
-/// to no sum.
+/// Σ v_j (x_j − `own`) of a row with columns in threes, by vectors of four numbers, the last of which is
+/// ignored.
 #[inline(always)]
 fn in_threes(offsets: &[i32], values: &[f64], x: &[f64], row: usize, own: f64) -> f64 {
     let mut sums = [0.0; 4];
@@ -81,7 +81,7 @@ fn in_threes(offsets: &[i32], values: &[f64], x: &[f64], row: usize, own: f64) -
     sums[0] + sums[1] + sums[2]
 }
 
-/// Σ K_ij (x_j − x_i) of a row, in four sums and the rest.
+/// Σ K_ij (x_j − x_i) of a row, in four partial sums and a remainder.
 #[inline(always)]
 fn flow(offsets: &[i32], values: &[f64], x: &[f64], row: usize) -> f64 {
     let own = x[row];
@@ -100,7 +100,7 @@ fn flow(offsets: &[i32], values: &[f64], x: &[f64], row: usize) -> f64 {
     (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }
 
-/// One work item of K x and M u, in one look at each row.
+/// Products K x and M u of one work item, in one pass over the rows.
 pub(super) struct Both<'a> {
     pub rows: &'a Rows,
     pub segments: &'a [Segment],
@@ -133,7 +133,7 @@ impl WithSimd for Both<'_> {
             let capacity = &stencils.capacity[range][..offsets.len()];
             for row in start..start + length {
                 let own = x[row];
-                // K x and M u, twice each
+                // K x and M u, two partial sums each
                 let mut sums = [0.0; 4];
                 let pairs = offsets.len() / 2;
                 for pair in 0..pairs {
@@ -156,7 +156,7 @@ impl WithSimd for Both<'_> {
     }
 }
 
-/// A run of equal rows.
+/// Product of a run of equal rows.
 struct Runs<'a> {
     rows: &'a Rows,
     segment: &'a Segment,
@@ -191,7 +191,7 @@ impl Runs<'_> {
     }
 }
 
-/// V vectors of rows of one stencil.
+/// Multiplies V vectors of rows of one stencil.
 #[inline(always)]
 #[allow(clippy::too_many_arguments)]
 fn block<S: Simd, const V: usize, const FLOW: bool>(
