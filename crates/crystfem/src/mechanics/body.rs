@@ -1,4 +1,4 @@
-//! A body of solidifying Maxwell elements on a mesh of hexahedra and tetrahedra: births, steps, supports.
+//! A body of solidifying Maxwell elements on hexahedra and tetrahedra: births, steps, supports.
 
 use super::branch::Energies;
 use super::element::{POINTS, Six};
@@ -9,62 +9,62 @@ use crate::error::Error;
 use crate::mesh::Mesh;
 use nalgebra::Vector3;
 
-/// Residual over the load at which a solution ends, unless told otherwise.
+/// Default relative residual at which a solution ends.
 const TOLERANCE: f64 = 1e-12;
 
-/// Elements, their state and displacements.
+/// Body of elements with their state and displacements.
 ///
-/// Strains of an element count from its birth: only increments of displacement enter, so that where shared
-/// nodes were before does not matter.
+/// Strains of an element count from its birth. Only increments of displacement enter, so that earlier
+/// positions of shared nodes do not matter.
 pub struct Body<'a> {
     pub(super) mesh: &'a Mesh,
-    /// Elements of one shape share their matrices.
+    /// Matrices of distinct element shapes.
     shapes: Vec<Element>,
     shape: Vec<u32>,
-    /// Residual over the load at which a solution ends.
+    /// Relative residual at which a solution ends.
     pub tolerance: f64,
-    /// State.
+    /// State of the body.
     pub state: BodyState,
 }
 
-/// State of a body, to continue bit by bit.
+/// State of a body, sufficient to continue with the same bits.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct BodyState {
-    /// Elastic strains of the branches at each Gauss point (0 beyond those of the element), element by
-    /// element; empty before birth.
+    /// Elastic strains of the branches at each Gauss point, element by element (0 beyond the element's
+    /// points); empty before birth.
     strains: Vec<Vec<[[f64; 6]; POINTS]>>,
     /// Σ E b s e at the Gauss points of each element at the end of the last step, Pa: the stress over Ĉ.
     stresses: Vec<[[f64; 6]; POINTS]>,
     /// Displacements of the nodes, m.
     pub displacement: Vec<[f64; 3]>,
-    /// Iterations of conjugate gradients so far.
+    /// Total number of conjugate-gradient iterations.
     pub iterations: u64,
-    /// Rotation of each element since it was melt, rad: half the curl of the displacement in its middle.
+    /// Rotation of each element since it solidified, rad: half the curl of the displacement at its centre.
     rotations: Vec<[f64; 3]>,
-    /// Energies of all steps so far.
+    /// Energies of all past steps.
     pub balance: EnergyBalance,
 }
 
 /// Energies of the steps of a body, J.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct EnergyBalance {
-    /// Of all branches of all elements.
+    /// Sum over all branches of all elements.
     pub energies: Energies,
     /// Energy dissipated by the minimum stiffness of the melt.
     pub floor: f64,
-    /// Largest |[`Energies::closure`]| of a step over the energies that it moved and those stored.
+    /// Largest |[`Energies::closure`]| of a step over the energies moved and stored.
     pub worst: f64,
 }
 
-/// A prescribed displacement increment of 0: node and component.
+/// A fixed node and component: zero displacement increment.
 pub type Support = (u32, usize);
 
 impl<'a> Body<'a> {
-    /// A body without any element born.
+    /// Returns a body without active elements.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for other elements than hexahedra of first order and tetrahedra, for elements
-    /// that are turned inside out, and for a Poisson's ratio outside −1 … 0.5.
+    /// [`Error::Parameter`] for elements other than first-order hexahedra and tetrahedra, for inverted
+    /// elements, and for a Poisson's ratio outside −1 … 0.5.
     pub fn new(mesh: &'a Mesh, poisson: f64) -> Result<Self, Error> {
         let fault =
             |name, found: f64, allowed: &str| Error::Parameter { name, found, allowed: allowed.to_owned() };
@@ -107,7 +107,7 @@ impl<'a> Body<'a> {
         })
     }
 
-    /// Elements without stress and strain from now on.
+    /// Activates elements, free of stress and strain.
     pub fn born(&mut self, elements: impl IntoIterator<Item = usize>, branches: usize) {
         for element in elements {
             self.state.strains[element] = vec![[[0.0; 6]; POINTS]; branches];
@@ -120,8 +120,8 @@ impl<'a> Body<'a> {
         &self.shapes[self.shape[element] as usize]
     }
 
-    /// Largest rotation of an element since it was melt, rad. Strains are small: a rotation θ looks like a
-    /// strain ½θ².
+    /// Largest rotation of an element since it solidified, rad. The theory assumes small strains: a rotation
+    /// θ appears as a strain ½θ².
     pub fn largest_rotation(&self) -> f64 {
         self.state.rotations.iter().map(|r| r[0].hypot(r[1]).hypot(r[2])).fold(0.0, f64::max)
     }
@@ -136,7 +136,7 @@ impl<'a> Body<'a> {
         self.shape_of(element).weights().len()
     }
 
-    /// Mean of an element's stress by volume, Pa: of its Gauss points.
+    /// Volume average of an element's stress over its Gauss points, Pa.
     pub fn mean_stress(&self, element: usize) -> [f64; 6] {
         let weights = self.shape_of(element).weights();
         let volume: f64 = weights.iter().sum();
@@ -149,12 +149,12 @@ impl<'a> Body<'a> {
         self.mesh.nodes(element as u32)
     }
 
-    /// One step of all elements that are born: `increment` of an element, and its linear free strain at a
-    /// Gauss point and its place (at the Gauss points: taken at the centre alone, it would leave stresses in
-    /// a body that bends freely). One linear solution.
+    /// Makes one step of all active elements, by one linear solution. `increment` gives the increment of an
+    /// element, and the linear free strain at a Gauss point and its position (a value at the centre alone
+    /// would leave stresses in a freely bending body).
     ///
     /// # Errors
-    /// [`Error::Parameter`] where conjugate gradients do not converge: the supports leave a rigid motion that
+    /// [`Error::Parameter`] if conjugate gradients do not converge: the supports leave a rigid motion that
     /// the loads drive.
     pub fn step(
         &mut self,
@@ -179,7 +179,7 @@ impl<'a> Body<'a> {
             for (point, free) in free.iter_mut().enumerate().take(count) {
                 *free = free_strain(element, point, place(&places, point));
             }
-            // the stress of a step without displacement
+            // stress of a step without displacement
             let predicted: [Six; POINTS] = std::array::from_fn(|point| {
                 let mut strains: Vec<[f64; 6]> =
                     self.state.strains[element].iter().map(|branch| branch[point]).collect();
@@ -238,7 +238,7 @@ impl<'a> Body<'a> {
     }
 }
 
-/// The nodes of an element at rest.
+/// Initial positions of an element's nodes.
 fn places(mesh: &Mesh, element: u32) -> Vec<[f64; 3]> {
     mesh.nodes(element).iter().map(|&node| mesh.points[node as usize]).collect()
 }
@@ -252,7 +252,7 @@ fn place(places: &[[f64; 3]], point: usize) -> [f64; 3] {
     place
 }
 
-/// Δε − Δε* 1.
+/// Mechanical strain increment Δε − Δε* 1.
 fn mechanical(strain: &Six, free: f64) -> [f64; 6] {
     std::array::from_fn(|k| strain[k] - if k < 3 { free } else { 0.0 })
 }

@@ -1,25 +1,25 @@
-//! Elements of all kinds.
+//! Element kinds of the mechanics.
 
 use super::element::{Hexahedron, Modal, POINTS, Six, Wide};
 use super::tetrahedron::{self, Tetrahedron};
 
-/// Nodes of an element at most.
+/// Maximum number of nodes of an element.
 pub const MOST: usize = 10;
 /// A hexahedron of 8 nodes, or a tetrahedron of 4 or 10.
 #[derive(Clone, Debug)]
 pub enum Element {
-    /// 8 nodes, 8 Gauss points.
+    /// Hexahedron of 8 nodes and 8 Gauss points.
     Hexahedron(Box<Hexahedron>),
-    /// 4 nodes and 1 Gauss point, or 10 and 4.
+    /// Tetrahedron of 4 nodes and 1 Gauss point, or of 10 and 4.
     Tetrahedron(Box<Tetrahedron>),
 }
 
-/// Returns whether stress can be computed in an element of this number of nodes.
+/// Returns true if stress can be computed in elements with this number of nodes.
 pub fn is_known(nodes: usize) -> bool {
     matches!(nodes, 4 | 8 | 10)
 }
 
-/// Number of Gauss points of an element of so many nodes.
+/// Number of Gauss points of an element with `nodes` nodes.
 pub fn points(nodes: usize) -> usize {
     match nodes {
         4 => 1,
@@ -28,7 +28,7 @@ pub fn points(nodes: usize) -> usize {
     }
 }
 
-/// Shares of the nodes at a Gauss point of an element of so many nodes.
+/// Shape functions at a Gauss point of an element with `nodes` nodes.
 pub fn shares(nodes: usize, point: usize) -> [f64; MOST] {
     if nodes != 8 {
         return tetrahedron::shares(nodes, point);
@@ -37,7 +37,7 @@ pub fn shares(nodes: usize, point: usize) -> [f64; MOST] {
     std::array::from_fn(|node| own.get(node).copied().unwrap_or(0.0))
 }
 
-/// Elements of one shape have one key: their edges to 1e-12 of their size.
+/// Key of a shape: the edges to 1e-12 of their size; equal for elements of the same shape.
 pub fn key(places: &[[f64; 3]]) -> Vec<i64> {
     if let Ok(corners) = <&[[f64; 3]; 8]>::try_from(places) {
         return Hexahedron::key(corners);
@@ -52,7 +52,7 @@ pub fn key(places: &[[f64; 3]]) -> Vec<i64> {
 }
 
 impl Element {
-    /// Builds the element of 8, 4 or 10 nodes, m; `None` of others, and where it is turned inside out.
+    /// Computes an element from 8, 4 or 10 node positions, m; `None` for other numbers, or if inverted.
     pub fn new(places: &[[f64; 3]], poisson: f64) -> Option<Self> {
         match places.len() {
             8 => Hexahedron::new(places.first_chunk()?, poisson).map(|own| Self::Hexahedron(Box::new(own))),
@@ -69,7 +69,7 @@ impl Element {
         }
     }
 
-    /// K̂ over the modulus, without what is condensed, column by column.
+    /// Condensed stiffness K̂ over the modulus, column by column.
     pub fn condensed(&self) -> &[f64] {
         match self {
             Self::Hexahedron(own) => own.condensed.as_slice(),
@@ -77,7 +77,7 @@ impl Element {
         }
     }
 
-    /// σ over the modulus of an elastic strain.
+    /// Stress over the modulus, from an elastic strain.
     pub fn stress(&self, strain: &Six) -> Six {
         match self {
             Self::Hexahedron(own) => own.stress(strain),
@@ -85,7 +85,7 @@ impl Element {
         }
     }
 
-    /// See [`Hexahedron::forces`].
+    /// Nodal and modal forces, see [`Hexahedron::forces`].
     pub fn forces(&self, stresses: &[Six; POINTS]) -> (Wide, Modal) {
         match self {
             Self::Hexahedron(own) => {
@@ -98,7 +98,7 @@ impl Element {
         }
     }
 
-    /// See [`Hexahedron::strains`].
+    /// Strain increments, see [`Hexahedron::strains`].
     pub fn strains(&self, displacement: &Wide, modal: &Modal, modulus: f64) -> [Six; POINTS] {
         match self {
             Self::Hexahedron(own) => {
@@ -108,7 +108,7 @@ impl Element {
         }
     }
 
-    /// Half the curl of nodal displacements in the middle, rad.
+    /// Rotation at the centre by nodal displacements, half their curl, rad.
     pub fn rotation(&self, displacement: &Wide) -> [f64; 3] {
         match self {
             Self::Hexahedron(own) => own.rotation(&displacement.fixed_rows::<24>(0).into_owned()),

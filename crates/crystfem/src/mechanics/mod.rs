@@ -1,6 +1,6 @@
-//! Stress of printed parts: a solidifying Maxwell body at small strains, whose free strain is a function of
-//! temperature and degree of crystallization. The guide's page *Stress of prints* has the model; here it is
-//! at a material point.
+//! Stress of printed parts: a solidifying Maxwell body at small strains, with a free strain that is a
+//! function of temperature and degree of crystallization. The guide's page *Stress of prints* describes the
+//! model.
 
 mod body;
 mod branch;

@@ -1,4 +1,4 @@
-//! One linear solution of a body: conjugate gradients without a matrix.
+//! Linear solution of a body by matrix-free conjugate gradients.
 
 use super::body::Body;
 use super::coarse::Coarse;
@@ -10,25 +10,25 @@ use polycore::numerics::conjugate_gradients;
 
 const NONE: u32 = u32::MAX;
 
-/// Iterations at most, over the equations.
+/// Limit on iterations, per equation.
 const ITERATIONS: usize = 20;
 
-/// A load below this part of the forces that add up to it is their rounding.
+/// Relative size of a load, over its contributions, that is rounding.
 const ROUNDING: f64 = 1e-14;
 
 impl Body<'_> {
-    /// Conjugate gradients with the inverse 3 × 3 blocks of the nodes and a coarse level of rigid motions, on
-    /// the nodes that exist; adds its iterations to the state.
+    /// Solves by conjugate gradients with the inverse 3 × 3 blocks of the nodes and a coarse level of rigid
+    /// motions, on the existing nodes; adds its iterations to the state.
     ///
     /// # Errors
-    /// [`Error::Parameter`] where they do not converge.
+    /// [`Error::Parameter`] without convergence.
     pub(super) fn solve(
         &mut self,
         moduli: &[(usize, f64)],
         free: &[[bool; 3]],
         load: Load,
     ) -> Result<Vec<Vector3<f64>>, Error> {
-        // number of each node among those that exist
+        // index of each node among the existing ones
         let mut number = vec![NONE; free.len()];
         for &node in moduli.iter().flat_map(|&(element, _)| self.nodes(element)) {
             number[node as usize] = 0;

@@ -3,7 +3,7 @@ use crate::mechanics::{Hexahedron, SolidifyingMaxwell};
 use evidence::{at_most, near};
 use nalgebra::SVector;
 
-/// An elastic body that does not expand by itself.
+/// Returns an elastic body without expansion.
 fn elastic(modulus: f64) -> SolidifyingMaxwell {
     SolidifyingMaxwell::elastic(modulus, 0.0, 0.0, f64::INFINITY)
 }
@@ -12,7 +12,7 @@ fn hold(modulus: f64) -> Increment {
     elastic(modulus).increment([300.0, 0.0], [300.0, 0.0], 0.0)
 }
 
-/// A block of elements from the origin on, with its layers along z.
+/// Returns a block of elements from the origin on, with layers along z.
 fn block(count: [usize; 3], size: [f64; 3]) -> Mesh {
     let [nx, ny, nz] = count;
     let node = |i: usize, j: usize, k: usize| ((k * (ny + 1) + j) * (nx + 1) + i) as u32;
@@ -42,7 +42,8 @@ fn block(count: [usize; 3], size: [f64; 3]) -> Mesh {
     mesh
 }
 
-/// 3-2-1: the corner at the origin, two components of that along x, one of that along y.
+/// Returns 3-2-1 supports: the corner at the origin, two components of the corner along x, one of that along
+/// y.
 fn resting(mesh: &Mesh) -> Vec<Support> {
     let far = |d: usize| {
         let most = mesh.points.iter().map(|p| p[d]).fold(0.0, f64::max);
@@ -51,7 +52,7 @@ fn resting(mesh: &Mesh) -> Vec<Support> {
     vec![(0, 0), (0, 1), (0, 2), (far(0), 1), (far(0), 2), (far(1), 2)]
 }
 
-/// Curvature of the lower edge by least squares over the middle quarter of the length.
+/// Returns the curvature of the lower edge by least squares over the middle quarter of the length.
 fn curvature(mesh: &Mesh, body: &Body) -> f64 {
     let length = mesh.points.iter().map(|p| p[0]).fold(0.0, f64::max);
     let edge: Vec<[f64; 2]> = (0..mesh.points.len())
@@ -64,8 +65,8 @@ fn curvature(mesh: &Mesh, body: &Body) -> f64 {
     2.0 * matrix.svd(true, true).solve(&right, 1e-14).unwrap()[2] / (length * length)
 }
 
-/// A block with one distorted element inside under displacements of a linear field: strains of every Gauss
-/// point are exact.
+/// Patch test: strains at every Gauss point are exact in a block with one distorted element inside, under
+/// displacements of a linear field.
 #[test]
 fn the_patch_test_holds() {
     let mut mesh = block([3, 3, 3], [3.0, 3.0, 3.0]);
@@ -86,7 +87,7 @@ fn the_patch_test_holds() {
     }
 }
 
-/// A free cube whose free strain is linear in z bends without stress.
+/// A free cube with a free strain linear in z bends without stress.
 #[test]
 fn a_free_cube_has_no_stress() {
     let mesh = block([3, 3, 3], [3e-3; 3]);
@@ -132,7 +133,7 @@ fn layers_in_sequence_bend() {
     }
 }
 
-/// The same on a substrate of 2 mm, 2 mm in all: κ = Σ 6εh(t + (i − 1)h)/(t + ih)³, towards 15 /m of
+/// Layers on a substrate of 2 mm, 2 mm in all: κ = Σ 6εh(t + (i − 1)h)/(t + ih)³, towards 15 /m for
 /// infinitely many.
 #[test]
 fn layers_bend_their_substrate() {
@@ -159,7 +160,7 @@ fn layers_bend_their_substrate() {
     }
 }
 
-/// Eight layers on a bed, ε = 0.010 + 0.004(i − ½)/8, then released: beam 0.4921875 /m, `fem.py` 0.50156.
+/// Eight layers on a bed, ε = 0.010 + 0.004(i − ½)/8, are released: beam 0.4921875 /m, `fem.py` 0.50156.
 #[test]
 fn a_part_is_released_from_its_bed() {
     let mesh = block([32, 1, 8], [0.064, 2e-3, 8e-3]);
@@ -179,8 +180,8 @@ fn a_part_is_released_from_its_bed() {
     near("stress_released", curvature(&mesh, &body).abs() / 0.501_560_187, 1.0, 1e-5);
 }
 
-/// The same release: its work is ½R·Δu of the reactions, what it stores balances that, and rotations are
-/// those of a circle.
+/// Work of a release is ½R·Δu of the reactions and balances the stored energy; rotations are those of a
+/// circle.
 #[test]
 fn a_release_does_the_work_of_its_reactions() {
     let mesh = block([32, 1, 4], [0.064, 2e-3, 4e-3]);
@@ -210,13 +211,13 @@ fn a_release_does_the_work_of_its_reactions() {
     near("stress_release_work", work / by_reactions, 1.0, 1e-9);
     assert!(work < 0.0);
     at_most("stress_release_closure", body.state.balance.worst, 1e-13);
-    // both ends rest: the middles of the last elements are 31 mm from the middle of the arc
+    // both ends rest: centres of the last elements are 31 mm from the middle of the arc
     let turned = body.largest_rotation();
     near("stress_release_rotation", turned / (curvature(&mesh, &body).abs() * 0.031), 1.0, 2e-3);
 }
 
-/// Work of the solver: `/work/shared/reference/print/pcg.csv` and `pcg_slender.csv`, to 1e-6 of the load,
-/// with a molten top layer.
+/// Iterations of the solver agree with `/work/shared/reference/print/pcg.csv` and `pcg_slender.csv`, to 1e-6
+/// of the load, with a molten top layer.
 #[test]
 fn iterations_do_not_follow_the_shape() {
     for (count, floor, published) in [

@@ -20,28 +20,29 @@ use place::Place;
 use sets::{Entry, Resolver, Set, SetKind};
 pub use write::write;
 
-/// Reads a mesh, coordinates multiplied by `scale` (1e-3 for a file in mm).
+/// Reads a mesh, with coordinates multiplied by `scale` (1e-3 for a file in mm).
 ///
-/// Understood, in any case of letters: `*NODE` (`NSET`), `*ELEMENT` (`TYPE`, `ELSET`), `*NSET` and `*ELSET`
-/// (`GENERATE`, names of other sets, `*NSET, ELSET=`), `*SURFACE` (of elements, with or without `Sn`, or of
-/// nodes), one `*PART` with one `*INSTANCE` (moved and turned), `*INCLUDE`, continuation lines, comments.
-/// Triangles and quadrangles of shells and membranes name surfaces, lines nothing. Other keywords are passed
-/// over: the notes name them, with the key of a scene that means the same. A name keeps the letters of its
+/// Supported keywords, in upper or lower case: `*NODE` (`NSET`), `*ELEMENT` (`TYPE`, `ELSET`), `*NSET` and
+/// `*ELSET` (`GENERATE`, names of other sets, `*NSET, ELSET=`), `*SURFACE` (of elements, with or without
+/// `Sn`, or of nodes), one `*PART` with one `*INSTANCE` (translated and rotated), `*INCLUDE`, continuation
+/// lines, comments. Triangles and quadrangles of shells and membranes name surfaces; lines are ignored. Other
+/// keywords are skipped: notes name them, with the equivalent scene key. A name keeps the letter case of its
 /// first use.
 ///
 /// # Errors
-/// [`Error::Shared`] where the file cannot be read; [`Error::File`] with the line: other elements, numbers
-/// that do not fit, sets and nodes that do not exist, and what would change the mesh unseen (`*NGEN`,
-/// `*SYSTEM`, …); [`Error::Mesh`] from [`crate::mesh::quality::check`]. Memory follows the size of the file.
+/// [`Error::Shared`] if the file cannot be read; [`Error::File`] with the line for other elements, numbers
+/// that do not fit, sets and nodes that do not exist, and keywords that would change the mesh (`*NGEN`,
+/// `*SYSTEM`, …); [`Error::Mesh`] from [`crate::mesh::quality::check`]. Memory is bounded by the size of the
+/// file.
 pub fn read(path: &Path, scale: f64) -> Result<ReadMesh, Error> {
     let bytes = crate::file::read_bytes(path)?;
     parse(path, &bytes, scale)
 }
 
-/// [`read`], of bytes; `path` is for messages only.
+/// Reads a mesh from bytes; `path` is for messages only.
 ///
 /// # Errors
-/// See [`read`].
+/// Errors of [`read`].
 pub fn parse(path: &Path, bytes: &[u8], scale: f64) -> Result<ReadMesh, Error> {
     let mut cards = Cards::new(path, bytes);
     mesh(path, &mut cards, scale).map_err(|error| cards.placed(error))
@@ -86,7 +87,7 @@ fn mesh(path: &Path, cards: &mut Cards, scale: f64) -> Result<ReadMesh, Error> {
     reader.content.into_mesh(path, &nodes, scale)
 }
 
-/// Keywords that make or move nodes and elements: passing them over would leave another mesh.
+/// Keywords that make or move nodes and elements: skipping them would give another mesh.
 const CHANGING: [&str; 10] = [
     "NGEN",
     "NFILL",
@@ -100,7 +101,7 @@ const CHANGING: [&str; 10] = [
     "MODEL CHANGE",
 ];
 
-/// Elements by the stems of their names.
+/// Element kinds by the stems of their names.
 const STEMS: [(Kind, &[&str]); 13] = [
     (Kind::Solid(Shape::Hexahedron), &["C3D8", "DC3D8", "DCC3D8"]),
     (Kind::Solid(Shape::Tetrahedron), &["C3D4", "DC3D4"]),
@@ -117,8 +118,8 @@ const STEMS: [(Kind, &[&str]); 13] = [
     (Kind::Point, &["MASS", "HEATCAP"]),
 ];
 
-/// Kind of an element by its name in upper case: letters after a stem (R, I, H, T, …) tell of integration and
-/// physics, not of nodes.
+/// Returns the kind of an element by its name in upper case: letters after a stem (R, I, H, T, …) denote
+/// integration and physics, not nodes.
 fn kind_of(name: &str) -> Option<Kind> {
     let is = |stem: &&str| {
         name.strip_prefix(stem).is_some_and(|rest| rest.bytes().all(|byte| byte.is_ascii_alphabetic()))
@@ -130,9 +131,9 @@ struct Reader<'a> {
     path: &'a Path,
     content: Content,
     sets: Vec<Set>,
-    /// First lines of keywords that may come once.
+    /// First lines of keywords allowed only once.
     single: BTreeMap<String, usize>,
-    /// Where the instance is.
+    /// Position of the instance.
     place: Option<Place>,
 }
 
@@ -281,7 +282,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// One part and one instance of it: numbers are then unique.
+    /// Checks that there is one part with one instance, so that numbers are unique.
     fn once(&mut self, card: &Card) -> Result<(), Error> {
         let Some(line) = self.single.insert(card.keyword.clone(), card.line) else { return Ok(()) };
         let allowed = "one: write the deck without parts and assemblies (Abaqus/CAE: Model, Edit Attributes)";

@@ -1,10 +1,10 @@
-//! The printed bar on its substrate, Fig. 4.2 of the thesis.
+//! Printed bar on its substrate, Fig. 4.2 of the thesis.
 
 use crate::error::Error;
 use crate::mesh::structured::{MAX_NODES, count as fill, few_enough};
 use crate::mesh::{Block, Face, Grid, Mesh, Split, graded};
 
-/// A bar printed in layers, its lower face at z = 0, its middle at x = y = 0.
+/// A bar printed in layers, with its lower face at z = 0 and its centre at x = y = 0.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bar {
     /// Extents along x and y, m.
@@ -13,41 +13,41 @@ pub struct Bar {
     pub layers: usize,
     /// Height of a layer, m.
     pub layer_height: f64,
-    /// Elements through a layer.
+    /// Number of elements through a layer.
     pub elements_per_layer: usize,
-    /// Greatest element along x and y, m.
+    /// Largest element along x and y, m.
     pub element_size: f64,
-    /// What it is printed on; `None`: the bar alone.
+    /// Substrate; `None` for a bar alone.
     pub substrate: Option<Substrate>,
-    /// What fills the cells.
+    /// Element type.
     pub cells: Split,
 }
 
-/// A plate below the bar, its upper face at z = 0.
+/// A plate below the bar, with its upper face at z = 0.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Substrate {
-    /// Extents along x and y, m: not below the bar's.
+    /// Extents along x and y, m; at least those of the bar.
     pub size: [f64; 2],
     /// Thickness, m.
     pub thickness: f64,
-    /// Length of each element over that of its neighbour nearer to the bar, sideways and down: 1 or more.
+    /// Ratio of lengths of neighbouring elements, growing away from the bar sideways and down: 1 or more.
     pub growth: f64,
 }
 
 impl Bar {
-    /// A bar alone, m: two elements through a layer, hexahedra about two layers' height long.
+    /// Returns a bar alone, m: two elements through a layer, hexahedra about two layer heights long.
     pub fn new(size: [f64; 2], layers: usize, layer_height: f64) -> Self {
         let (elements_per_layer, element_size, cells) = (2, 2.0 * layer_height, Split::Hexahedra);
         Self { size, layers, layer_height, elements_per_layer, element_size, substrate: None, cells }
     }
 
-    /// Conforming elements: element sets `bar`, `layer-1` … `layer-N`, `substrate`; surfaces and node sets on
-    /// the sides of the box around all, [`crate::mesh::BOX_SIDES`] (`bottom` is the substrate's lower face),
-    /// and `interface`, the bar's lower face.
+    /// Meshes bar and substrate with conforming elements: element sets `bar`, `layer-1` … `layer-N`,
+    /// `substrate`; surfaces and node sets on the sides of the bounding box, [`crate::mesh::BOX_SIDES`]
+    /// (`bottom` is the substrate's lower face), and `interface`, the bar's lower face.
     ///
     /// # Errors
-    /// Sizes or counts that are not positive, a layer without thickness or elements, a substrate smaller than
-    /// the bar, more nodes than 2²⁸.
+    /// [`Error::Parameter`] for sizes or counts that are not positive, a layer without thickness or elements,
+    /// a substrate smaller than the bar, and more than 2²⁸ nodes.
     pub fn mesh(&self) -> Result<Mesh, Error> {
         let grid = self.grid()?;
         let [x, y] = self.size.map(|size| 0.5 * size);
@@ -74,11 +74,11 @@ impl Bar {
         Ok(mesh)
     }
 
-    /// Elements along each axis of the grid through bar and substrate, as real numbers: they may be too many
-    /// to make.
+    /// Number of elements along each axis of the grid through bar and substrate, as real numbers: they may be
+    /// too many to build.
     ///
     /// # Errors
-    /// As [`Bar::mesh`].
+    /// Errors of [`Bar::mesh`].
     pub fn elements(&self) -> Result<[f64; 3], Error> {
         let count = |name, found: usize| match (1..MAX_NODES).contains(&found) {
             true => Ok(()),
@@ -124,7 +124,7 @@ impl Bar {
         Ok(elements)
     }
 
-    /// The lines of bar and substrate.
+    /// Grid lines of bar and substrate.
     fn grid(&self) -> Result<Grid, Error> {
         self.elements()?;
         let mut lines = [const { Vec::new() }; 3];
@@ -149,7 +149,7 @@ impl Bar {
             let below = graded(substrate.thickness, self.layer_height / step, substrate.growth)?;
             lines[2].extend(away(0.0, below).into_iter().rev().map(|z| -z));
         }
-        // layer faces are the products that the blocks of the layers are bounded by
+        // layer faces are computed like the bounds of the layers' blocks
         lines[2].extend((0..=self.layers * self.elements_per_layer).map(|k| {
             (k / self.elements_per_layer) as f64 * self.layer_height
                 + self.layer_height * ((k % self.elements_per_layer) as f64 / step)

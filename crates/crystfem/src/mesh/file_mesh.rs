@@ -8,29 +8,29 @@ use crate::file::line_error;
 use crate::mesh::quality::{self, Quality};
 use crate::mesh::{Cell, Face, Mesh, Shape};
 
-/// A mesh as read from a file, checked.
+/// A checked mesh from a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReadMesh {
-    /// The mesh; nodes and elements in the order of the file, 8-node hexahedra before 4-node tetrahedra
-    /// before others, nodes of no element left out.
+    /// Mesh with nodes and elements in the order of the file, 8-node hexahedra before 4-node tetrahedra
+    /// before others, without unused nodes.
     pub mesh: Mesh,
-    /// The file's number of each node.
+    /// Label of each node in the file.
     pub node_labels: Vec<u64>,
-    /// The file's number of each element.
+    /// Label of each element in the file.
     pub element_labels: Vec<u64>,
     /// Result of [`quality::check`].
     pub quality: Quality,
-    /// Notes for the user: what was left out or should be looked at.
+    /// Notes for the user: omissions and doubtful input.
     pub notes: Vec<String>,
 }
 
-/// Kinds of elements in files: those computed on, and those that only name faces and nodes.
+/// Element kinds in files: solids, and kinds that only name faces and nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Solid(Shape),
     Quadrangle,
     Triangle,
-    /// With nodes on the middles of its edges.
+    /// Quadrangle with mid-edge nodes.
     Quadrangle8,
     Triangle6,
     Line,
@@ -51,12 +51,12 @@ impl Kind {
         }
     }
 
-    /// The shape of what is computed on.
+    /// Element type of a solid.
     pub fn solid(self) -> Option<Shape> {
         if let Self::Solid(shape) = self { Some(shape) } else { None }
     }
 
-    /// Corners of a triangle or quadrangle.
+    /// Number of corners of a triangle or quadrangle.
     fn facet(self) -> Option<usize> {
         match self {
             Self::Quadrangle | Self::Quadrangle8 => Some(4),
@@ -72,7 +72,7 @@ pub(super) struct Element {
     pub label: u64,
     pub line: u32,
     pub kind: Kind,
-    /// Where its nodes begin in [`Content::element_nodes`]; as many count as the kind has.
+    /// Index of its first node in [`FileContent::element_nodes`]; the kind gives their number.
     pub first: usize,
 }
 
@@ -84,29 +84,31 @@ pub(super) struct Node {
     pub point: [f64; 3],
 }
 
-/// Content of a file. Names and members of sets: positions in `nodes` and `elements`.
+/// Content of a file. Members of sets are indices into `nodes` and `elements`.
 #[derive(Debug, Default)]
 pub(super) struct Content {
     pub nodes: Vec<Node>,
     pub elements: Vec<Element>,
-    /// Numbers of the nodes of all elements, in the order of [`Shape`] of each.
+    /// Labels of the nodes of all elements, in the node order of [`Shape`].
     pub element_nodes: Vec<u64>,
     pub node_sets: BTreeMap<String, Vec<u32>>,
-    /// Hexahedra, tetrahedra and wedges become an element set, triangles and quadrangles a surface of the
-    /// same name.
+    /// Element sets by name; their solids become an element set, their triangles and quadrangles a surface of
+    /// the same name.
     pub element_sets: BTreeMap<String, Vec<u32>>,
     pub surfaces: BTreeMap<String, Vec<Face>>,
     pub notes: Vec<String>,
 }
 
-/// Positions of numbers that a file gives.
+/// Indices of the labels of a file.
 pub(super) struct Labels {
     sorted: Vec<(u64, u32)>,
 }
 
 impl Labels {
+    /// Sorts labels.
+    ///
     /// # Errors
-    /// Two of one number: both positions.
+    /// Both indices of a duplicate.
     pub fn new(labels: impl Iterator<Item = u64>) -> Result<Self, [u32; 2]> {
         let mut sorted: Vec<(u64, u32)> = labels.zip(0u32..).collect();
         // most files are in order already
@@ -120,7 +122,7 @@ impl Labels {
     }
 
     pub fn get(&self, label: u64) -> Option<u32> {
-        // numbers without gaps are found at once
+        // labels without gaps are found at once
         let first = self.sorted.first()?.0;
         let guess = usize::try_from(label.checked_sub(first)?).ok()?;
         if let Some(entry) = self.sorted.get(guess)
@@ -131,7 +133,7 @@ impl Labels {
         self.sorted.binary_search_by_key(&label, |entry| entry.0).ok().map(|place| self.sorted[place].1)
     }
 
-    /// Numbers from `first` to `last` that exist, with their positions.
+    /// Existing labels from `first` to `last`, with their indices.
     pub fn range(&self, first: u64, last: u64) -> &[(u64, u32)] {
         let start = self.sorted.partition_point(|entry| entry.0 < first);
         let end = self.sorted.partition_point(|entry| entry.0 <= last);
@@ -140,15 +142,15 @@ impl Labels {
 }
 
 impl Content {
-    /// Numbers of an element's nodes.
+    /// Labels of an element's nodes.
     pub fn nodes_of(&self, element: &Element) -> &[u64] {
         &self.element_nodes[element.first..element.first + element.kind.node_count()]
     }
 
-    /// Numbers of nodes and of elements.
+    /// Indices of the labels of nodes and of elements.
     ///
     /// # Errors
-    /// A number twice.
+    /// [`Error::File`] for a duplicate label.
     pub fn labels(&self, path: &Path) -> Result<[Labels; 2], Error> {
         let nodes = Labels::new(self.nodes.iter().map(|node| node.label)).map_err(|[a, b]| {
             let [a, b] = [a, b].map(|place| self.nodes[place as usize]);
@@ -163,10 +165,11 @@ impl Content {
         Ok([nodes, elements])
     }
 
-    /// The mesh, coordinates multiplied by `scale`; `nodes` as of [`Self::labels`].
+    /// Converts to a mesh, with coordinates multiplied by `scale`; `nodes` come from [`Self::labels`].
     ///
     /// # Errors
-    /// A scale that is not positive, a node that does not exist, and what [`quality::check`] refuses.
+    /// [`Error::Parameter`] for a scale that is not positive, [`Error::File`] for a missing node, and errors
+    /// of [`quality::check`].
     pub fn into_mesh(mut self, path: &Path, nodes: &Labels, scale: f64) -> Result<ReadMesh, Error> {
         if !(scale > 0.0 && scale.is_finite()) {
             let allowed = "positive and finite, m per unit of the file".into();
@@ -175,9 +178,9 @@ impl Content {
         let mut mesh = Mesh::default();
         mesh.points.extend(self.nodes.iter().map(|node| node.point.map(|x| scale * x)));
         mesh.node_sets = std::mem::take(&mut self.node_sets);
-        // of hexahedra, tetrahedra and others
+        // hexahedra, tetrahedra and others
         let mut labels = [const { Vec::new() }; 3];
-        // number in the mesh, of each of the three among themselves at first
+        // index in the mesh, first within each of the three
         let mut number = vec![u32::MAX; self.elements.len()];
         let mut facets: Vec<([u32; 4], u32)> = Vec::new();
         let list = |shape| match shape {
@@ -239,7 +242,7 @@ impl Content {
         Ok(ReadMesh { mesh, node_labels, element_labels, quality, notes: self.notes })
     }
 
-    /// The face of a solid element that each triangle and quadrangle is; the first of two.
+    /// Finds the face of a solid element for each triangle and quadrangle; the first of two.
     fn match_facets(&mut self, mesh: &Mesh, mut facets: Vec<([u32; 4], u32)>) -> BTreeMap<u32, Face> {
         facets.sort_unstable();
         let mut face_of = BTreeMap::new();
@@ -267,7 +270,7 @@ impl Content {
         face_of
     }
 
-    /// Element sets and surfaces in the mesh's numbers.
+    /// Converts element sets and surfaces to the mesh's indices.
     fn name_sets(&mut self, mesh: &mut Mesh, number: &[u32], face_of: &BTreeMap<u32, Face>) {
         mesh.surfaces = std::mem::take(&mut self.surfaces);
         for faces in mesh.surfaces.values_mut() {

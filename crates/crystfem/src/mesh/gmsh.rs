@@ -1,8 +1,8 @@
 //! Reads Gmsh's MSH 2 and 4, ASCII and binary of either byte order
 //! (<https://gmsh.info/doc/texinfo/gmsh.html#MSH-file-format>).
 //!
-//! A reader of our own: `mshio` 0.4 does not read physical names and panics (`unimplemented!`, `expect`) on
-//! sizes and digits that it does not know.
+//! An own reader, because `mshio` 0.4 does not read physical names and panics (`unimplemented!`, `expect`) on
+//! unexpected sizes and digits.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -16,26 +16,26 @@ mod two;
 
 use numbers::{Numbers, Version};
 
-/// Reads a mesh, coordinates multiplied by `scale` (1e-3 for a file in mm). Physical groups of volumes become
-/// element sets, those of surfaces become surfaces and node sets, those of curves and points node sets; a
-/// group without a name is called `physical-TAG`. Hexahedra (8 or 20 nodes), tetrahedra (4 or 10) and prisms
-/// (6 or 15) are computed on; of 27 and 18 nodes those in the middles of sides and of the element are left
-/// out.
+/// Reads a mesh, with coordinates multiplied by `scale` (1e-3 for a file in mm). Physical groups of volumes
+/// become element sets, those of surfaces become surfaces and node sets, those of curves and points node
+/// sets; a group without a name is called `physical-TAG`. Supported solids are hexahedra (8 or 20 nodes),
+/// tetrahedra (4 or 10) and prisms (6 or 15); for 27 and 18 nodes those at the centres of sides and elements
+/// are left out.
 ///
 /// # Errors
-/// [`Error::Shared`] where the file cannot be read; [`Error::File`] with the line (in binary files the
-/// section's line and the byte) for what is not MSH 2 or 4, other elements, and numbers that do not fit;
-/// [`Error::Mesh`] from [`crate::mesh::quality::check`]. Memory follows the size of the file, not the counts
-/// that it announces.
+/// [`Error::Shared`] if the file cannot be read; [`Error::File`] with the line (in binary files the section's
+/// line and the byte) for files that are not MSH 2 or 4, other elements, and numbers that do not fit;
+/// [`Error::Mesh`] from [`crate::mesh::quality::check`]. Memory is bounded by the size of the file, not by
+/// the counts that it announces.
 pub fn read(path: &Path, scale: f64) -> Result<ReadMesh, Error> {
     let bytes = crate::file::read_bytes(path)?;
     parse(path, &bytes, scale)
 }
 
-/// [`read`], of bytes; `path` is for messages only.
+/// Reads a mesh from bytes; `path` is for messages only.
 ///
 /// # Errors
-/// See [`read`].
+/// Errors of [`read`].
 pub fn parse(path: &Path, bytes: &[u8], scale: f64) -> Result<ReadMesh, Error> {
     let mut reader = Reader {
         content: Content::default(),
@@ -88,14 +88,14 @@ struct Reader {
     names: BTreeMap<(i64, i64), String>,
     /// Physical groups of an entity by dimension and tag.
     groups: BTreeMap<(i64, i64), Vec<i64>>,
-    /// Members that groups may still have: sixteen a byte, so that memory follows the size of the file.
+    /// Limit on further members of groups: sixteen a byte, so that memory is bounded by the size of the file.
     members: usize,
     version: Version,
-    /// Elements of complete second order.
+    /// Number of elements of complete second order.
     reduced: usize,
 }
 
-/// Elements by their number in the format.
+/// Element kinds by their number in the format.
 const KINDS: [(i64, Kind); 16] = [
     (1, Kind::Line),
     (2, Kind::Triangle),
@@ -116,11 +116,11 @@ const KINDS: [(i64, Kind); 16] = [
     (13, Kind::Solid(Shape::Wedge15)),
 ];
 
-/// Nodes that elements of complete second order have more: quadrangles, hexahedra, prisms.
+/// Additional nodes of elements of complete second order: quadrangles, hexahedra, prisms.
 const MORE: [(i64, usize); 3] = [(10, 1), (12, 7), (13, 3)];
 
 impl Reader {
-    /// `count`, then lines of dimension, tag and "name"; text in binary files too.
+    /// Reads `count`, then lines of dimension, tag and "name"; text in binary files too.
     fn physical_names(&mut self, numbers: &mut Numbers) -> Result<(), Error> {
         let line = numbers.text_line();
         let Ok(count) = line.trim().parse::<u64>() else {
@@ -142,7 +142,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Physical groups of each entity.
+    /// Reads the physical groups of each entity.
     fn entities(&mut self, numbers: &mut Numbers) -> Result<(), Error> {
         let mut counts = [0; 4];
         for count in &mut counts {
@@ -151,7 +151,7 @@ impl Reader {
         for (dimension, count) in (0..).zip(counts) {
             for _ in 0..count {
                 let tag = numbers.int("tag of an entity")?;
-                // a point has a place, all else a box; in 4.0 each has one
+                // a point has a position, other entities a box; in 4.0 each has a box
                 for _ in 0..if dimension == 0 && self.version == Version::FourOne { 3 } else { 6 } {
                     numbers.double("place of an entity")?;
                 }
@@ -248,7 +248,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Blocks and members of a section; 4.1 has the least and greatest tags, too.
+    /// Reads the number of blocks and of members of a section; 4.1 has the smallest and largest tags, too.
     fn counts(&self, numbers: &mut Numbers) -> Result<[u64; 2], Error> {
         if self.version == Version::FourOne {
             return numbers.four_sizes().map(|[blocks, count, _, _]| [blocks, count]);
@@ -256,7 +256,7 @@ impl Reader {
         Ok([numbers.size("number of blocks")?, numbers.size("number of all")?])
     }
 
-    /// Dimension and tag of an entity; 4.0 has the tag first.
+    /// Reads dimension and tag of an entity; 4.0 has the tag first.
     fn entity(&self, numbers: &mut Numbers) -> Result<[i64; 2], Error> {
         if self.version == Version::Four {
             let tag = numbers.int("tag of an entity")?;
@@ -265,7 +265,7 @@ impl Reader {
         Ok([numbers.int("dimension of an entity")?, numbers.int("tag of an entity")?])
     }
 
-    /// An element, after its number.
+    /// Reads an element after its label.
     fn element(
         &mut self,
         numbers: &mut Numbers,
@@ -293,7 +293,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Elements of a physical group.
+    /// Adds an element to a physical group.
     fn add_to(
         &mut self,
         numbers: &Numbers,
@@ -315,7 +315,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Node sets of the groups of points, curves and surfaces.
+    /// Builds node sets of the groups of points, curves and surfaces.
     fn name_nodes(&mut self, nodes: &Labels) {
         let Content { elements, element_nodes, element_sets, node_sets, .. } = &mut self.content;
         element_sets.retain(|name, places| {
@@ -330,13 +330,13 @@ impl Reader {
             if !set.is_empty() {
                 node_sets.entry(name.clone()).or_default().extend(set);
             }
-            // of curves and points nothing else remains
+            // nothing else remains of curves and points
             members.into_iter().any(|element| !matches!(element.kind, Kind::Line | Kind::Line3 | Kind::Point))
         });
     }
 }
 
-/// The kind of a type of elements.
+/// Returns the kind of an element type.
 fn kind_of(numbers: &Numbers, code: i64) -> Result<Kind, Error> {
     KINDS.iter().find(|kind| kind.0 == code).map(|kind| kind.1).ok_or_else(|| {
         let pyramids = if matches!(code, 7 | 14 | 19) { " (pyramids are none)" } else { "" };
@@ -348,7 +348,7 @@ fn kind_of(numbers: &Numbers, code: i64) -> Result<Kind, Error> {
     })
 }
 
-/// A place, after the number of a node.
+/// Reads a position, after the label of a node.
 fn place(numbers: &mut Numbers) -> Result<[f64; 3], Error> {
     let mut point = [0.0; 3];
     for x in &mut point {
@@ -360,7 +360,7 @@ fn place(numbers: &mut Numbers) -> Result<[f64; 3], Error> {
     Ok(point)
 }
 
-/// A number of a node or an element where it has four bytes.
+/// Reads a label of a node or an element stored in four bytes.
 fn whole(numbers: &mut Numbers, what: &str) -> Result<u64, Error> {
     let number = numbers.int(what)?;
     u64::try_from(number).map_err(|_| numbers.error(what, number, "0 or more"))

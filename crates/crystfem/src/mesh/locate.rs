@@ -1,4 +1,4 @@
-//! Location of places in a mesh, for values between nodes.
+//! Location of points in a mesh, for interpolation.
 
 use super::Mesh;
 use crate::element::WIDE;
@@ -7,74 +7,74 @@ use crate::mesh::Shape;
 use nalgebra::{Matrix3, Vector3};
 use polycore::numerics::hexahedron;
 
-/// Natural coordinates, and distances over an element's diagonal, that count as none: a place on a node has
-/// its value.
+/// Tolerance in natural coordinates, and in distances over an element's diagonal: a point on a node has its
+/// value.
 const NEAR: f64 = 1e-9;
-/// What is added around an element's box, over its largest edge, where lines are cut: above rounding, and
-/// above `NEAR`.
+/// Enlargement of an element's box for cutting lines, over its longest edge: above rounding, and above
+/// `NEAR`.
 const BOX: f64 = 1e-6;
-/// Iterations for the natural coordinates in a hexahedron; a parallelepiped needs two.
+/// Limit on iterations for natural coordinates in a hexahedron; a parallelepiped needs two.
 const MOST_ITERATIONS: usize = 50;
-/// Part of an element by which a place may lie outside of the mesh.
+/// Largest distance outside the mesh, over the element's extent.
 const OUTSIDE: f64 = 0.5;
 
-/// A place in a mesh.
+/// A point in a mesh.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Place {
-    /// Nodes and their shape functions there, those that are not 0.
+    /// Nodes with their shape functions, if not 0.
     weights: Vec<(u32, f64)>,
-    /// Elements that hold it: one, or those that meet there.
+    /// Elements that contain the point: one, or all that meet there.
     elements: Vec<u32>,
-    /// Distance from the requested place, m; 0 inside the mesh.
+    /// Distance from the requested point, m; 0 inside the mesh.
     distance: f64,
 }
 
 impl Place {
-    /// Elements that hold it: one, or those that meet there.
+    /// Elements that contain the point: one, or all that meet there.
     pub fn elements(&self) -> &[u32] {
         &self.elements
     }
 
-    /// Distance from the requested place, m; 0 inside the mesh.
+    /// Distance from the requested point, m; 0 inside the mesh.
     pub fn distance(&self) -> f64 {
         self.distance
     }
 
-    /// Nodes with a weight.
+    /// Nodes with nonzero shape functions.
     pub fn nodes(&self) -> impl Iterator<Item = u32> {
         self.weights.iter().map(|pair| pair.0)
     }
 
-    /// Σ N_a u_a of a field over nodes; `None` where a node has no value.
+    /// Interpolates a field over nodes, Σ N_a u_a; `None` if a node has no value.
     pub fn value(&self, field: impl Fn(u32) -> Option<f64>) -> Option<f64> {
         self.weights.iter().map(|&(node, weight)| Some(weight * field(node)?)).sum()
     }
 }
 
 impl Mesh {
-    /// Returns whether a place, m, lies in an element or on its faces.
+    /// Returns true if a point, m, lies in an element or on its faces.
     pub fn holds(&self, element: u32, at: [f64; 3]) -> bool {
         self.shapes_at(element, at).is_some()
     }
 
-    /// Shape functions of an element's nodes at a place, m, in it or on its faces; `None` outside.
+    /// Shape functions of an element's nodes at a point, m; `None` outside the element and its faces.
     pub fn shapes_at(&self, element: u32, at: [f64; 3]) -> Option<[f64; WIDE]> {
         let (corners, nodes) = self.positions::<WIDE>(element);
         let (weights, distance, rounding) = near(corners.get(..nodes).filter(|list| !list.is_empty())?, at)?;
         (distance <= rounding).then_some(weights)
     }
 
-    /// The elements around a place, m, and the shape functions there. A place outside, but no further than
-    /// half an element's extent along each axis, is moved into the nearest element; `None` beyond.
+    /// Locates a point, m. A point outside, by at most half an element's extent along each axis, is moved
+    /// into the nearest element; `None` beyond.
     pub fn locate(&self, at: [f64; 3]) -> Option<Place> {
         self.locate_in(0..self.element_count() as u32, at)
     }
 
-    /// Where points in order along the line from `a` to `b` lie; `None` outside of the mesh.
+    /// Locates points in order along the line from `a` to `b`; `None` for points outside the mesh.
     pub fn locate_along(&self, a: [f64; 3], b: [f64; 3], points: &[[f64; 3]]) -> Vec<Option<Place>> {
         let along = [0, 1, 2].map(|d| b[d] - a[d]);
         let square: f64 = along.iter().map(|x| x * x).sum();
-        // the part of the line in each element's box, a little larger
+        // interval of the line in each element's slightly enlarged box
         let part = |element: u32| {
             let [low, high] = self.bounds_of(&[element])?;
             let around = BOX * (0..3).map(|d| high[d] - low[d]).fold(0.0, f64::max);
@@ -101,7 +101,7 @@ impl Mesh {
                 open.push(part);
             }
             open.retain(|part| part.1 >= here);
-            // in the order of all elements, as `locate` tries them
+            // in the order of all elements, like `locate`
             open.sort_unstable_by_key(|part| part.2);
             let place = self.locate_in(open.iter().map(|part| part.2), *at)?;
             (place.distance == 0.0).then_some(place)
@@ -134,8 +134,8 @@ impl Mesh {
     }
 }
 
-/// Shape functions at the nearest place in an element, how far that is, and what of it is rounding, m; `None`
-/// of a place further outside than half of its box.
+/// Shape functions at the nearest point in an element, the distance to it and the rounding error of that, m;
+/// `None` for a point outside by more than half of the element's box.
 fn near(corners: &[[f64; 3]], at: [f64; 3]) -> Option<([f64; WIDE], f64, f64)> {
     let near = (0..3).all(|d| {
         let ends = corners.iter().map(|corner| corner[d]);
@@ -158,17 +158,17 @@ fn near(corners: &[[f64; 3]], at: [f64; 3]) -> Option<([f64; WIDE], f64, f64)> {
     Some((weights, (offset(&at) - reached).norm(), NEAR * diagonal))
 }
 
-/// Shape functions at natural coordinates, which are taken to the nearest in the element.
+/// Shape functions of a hexahedron at natural coordinates, clamped to the element.
 fn of_hexahedron(natural: Vector3<f64>) -> [f64; WIDE] {
-    // exact at the ends: a node has the weight 1, and those across a face have 0
+    // exact at the ends: a node has weight 1, and those across a face have 0
     let natural = natural.map(|x| if x.abs() > 1.0 - NEAR { x.signum() } else { x });
     let mut weights = [0.0; WIDE];
     weights[..8].copy_from_slice(&hexahedron::shapes(natural.into()));
     weights
 }
 
-/// Of wedges and second-order elements, by Newton's method from the middle; natural coordinates are taken to
-/// the nearest in the element. Close to a curved face, the nearest place is that of the nearest natural
+/// Shape functions of wedges and second-order elements, by Newton's method from the centre, with natural
+/// coordinates clamped to the element. Near a curved face the nearest point is that of the nearest natural
 /// coordinates.
 fn in_other(shape: Shape, corners: &[[f64; 3]], at: [f64; 3]) -> [f64; WIDE] {
     let offset = |place: [f64; 3]| Vector3::from(place) - Vector3::from(corners[0]);
@@ -186,9 +186,9 @@ fn in_other(shape: Shape, corners: &[[f64; 3]], at: [f64; 3]) -> [f64; WIDE] {
             break;
         }
     }
-    // exact at the ends, so that a node has the weight 1
+    // exact at the ends, so that a node has weight 1
     let ends = |x: f64| if x.abs() > 1.0 - NEAR { x.signum() } else { x };
-    // so many barycentric coordinates, those below 0 taken to 0
+    // barycentric coordinates, clamped at 0
     let simplex = |count: usize, place: Vector3<f64>| {
         let mut own = [1.0 - place.iter().take(count).sum::<f64>(), place[0], place[1], place[2]];
         own[count + 1..].fill(0.0);
@@ -210,7 +210,7 @@ fn in_other(shape: Shape, corners: &[[f64; 3]], at: [f64; 3]) -> [f64; WIDE] {
     Natural::at(shape, place.into()).shapes
 }
 
-/// By Newton's method from the middle: x(ξ) = Σ N_a(ξ) x_a.
+/// Inverts x(ξ) = Σ N_a(ξ) x_a by Newton's method from the centre.
 fn in_hexahedron(corners: &[[f64; 3]], at: [f64; 3]) -> [f64; WIDE] {
     let offset = |place: [f64; 3]| Vector3::from(place) - Vector3::from(corners[0]);
     let mut natural = Vector3::<f64>::zeros();
@@ -222,7 +222,7 @@ fn in_hexahedron(corners: &[[f64; 3]], at: [f64; 3]) -> [f64; WIDE] {
             jacobian += offset(*corner) * Vector3::from(slope).transpose();
         }
         let Some(step) = jacobian.try_inverse().map(|inverse| inverse * left) else { break };
-        // far outside of a distorted element the map folds: no further than a neighbour's far side
+        // far outside a distorted element the map folds: stay within the far side of a neighbour
         natural = (natural + step).map(|x| x.clamp(-3.0, 3.0));
         if step.amax() <= 1e-14 {
             break;
@@ -231,7 +231,7 @@ fn in_hexahedron(corners: &[[f64; 3]], at: [f64; 3]) -> [f64; WIDE] {
     of_hexahedron(natural)
 }
 
-/// Barycentric coordinates, those below 0 taken to 0.
+/// Barycentric coordinates, clamped at 0.
 fn in_tetrahedron(corners: &[[f64; 3]], at: [f64; 3]) -> [f64; WIDE] {
     let offset = |place: [f64; 3]| Vector3::from(place) - Vector3::from(corners[0]);
     let edges = Matrix3::from_columns(&[offset(corners[1]), offset(corners[2]), offset(corners[3])]);
@@ -266,7 +266,7 @@ mod tests {
         1.0 + 2.0 * x - 3.0 * y + 4.0 * z
     }
 
-    /// Linear fields come back anywhere, and at a node its value to the last bit, held by all elements there.
+    /// Linear fields are exact anywhere, at nodes to the last bit, with all elements there.
     #[test]
     fn linear_fields_are_exact() {
         for mesh in meshes() {
@@ -296,7 +296,7 @@ mod tests {
         }
     }
 
-    /// Along lines through nodes, in faces, oblique and past the mesh: the places of `locate`, elements
+    /// Points along lines through nodes, in faces, oblique and past the mesh agree with `locate`, elements
     /// included.
     #[test]
     fn lines_find_what_single_places_find() {

@@ -1,8 +1,8 @@
-//! Hexahedra of a structured mesh split into tetrahedra and wedges.
+//! Splitting of structured hexahedra into tetrahedra and wedges.
 
 use crate::mesh::{Cell, Face, HEXAHEDRON_SIDES, Mesh, Shape};
 
-/// What fills the cells of a grid.
+/// Element type in the cells of a grid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
@@ -12,14 +12,14 @@ pub enum Split {
     Hexahedra,
     /// Five tetrahedra, mirrored from cell to cell so that diagonals meet.
     FiveTetrahedra,
-    /// Six tetrahedra around the diagonal from the first corner to the opposite one (Kuhn's division).
+    /// Six tetrahedra around the diagonal from the first to the opposite corner (Kuhn's triangulation).
     SixTetrahedra,
-    /// Two wedges with triangles below and above.
+    /// Two wedges, with triangles below and above.
     Wedges,
 }
 
 impl Split {
-    /// Elements of a cell.
+    /// Number of elements of a cell.
     pub fn count(self) -> usize {
         match self {
             Self::Hexahedra => 1,
@@ -33,13 +33,13 @@ impl Split {
 const SIX: [[usize; 4]; 6] =
     [[0, 1, 2, 6], [0, 2, 3, 6], [0, 3, 7, 6], [0, 7, 4, 6], [0, 4, 5, 6], [0, 5, 1, 6]];
 const WEDGES: [[usize; 6]; 2] = [[0, 1, 2, 4, 5, 6], [0, 2, 3, 4, 6, 7]];
-/// One in the middle, four at corners; the second list is for cells of odd parity.
+/// Central and four corner tetrahedra; the second list is for cells of odd parity.
 const FIVE: [[[usize; 4]; 5]; 2] = [
     [[0, 1, 2, 5], [0, 2, 3, 7], [0, 5, 7, 4], [2, 7, 5, 6], [0, 2, 7, 5]],
     [[1, 2, 3, 6], [0, 1, 3, 4], [1, 6, 4, 5], [3, 4, 6, 7], [1, 3, 4, 6]],
 ];
 
-/// Splits each hexahedron; sets and surfaces follow. `odd` tells the parity of each cell.
+/// Splits each hexahedron, with sets and surfaces; `odd` is the parity of each cell.
 pub(super) fn split(mesh: Mesh, odd: &[bool], into: Split) -> Mesh {
     if into == Split::Hexahedra {
         return mesh;
@@ -122,7 +122,7 @@ mod tests {
             let quality = quality::check(&mesh, None).unwrap();
             assert!((quality.volume - 12.0).abs() < 1e-13);
             assert!(quality.notes.is_empty(), "{:?}", quality.notes);
-            // conforming: nothing but the box's sides is outside, two triangles a square
+            // conforming: only the sides of the box are outer faces, two triangles a square
             let surface = Surface::of_all(&mesh).unwrap();
             assert_eq!(surface.faces().count(), 2 * 2 * (6 + 6 + 4));
             let mut named: Vec<Face> = mesh.surfaces.values().flatten().copied().collect();

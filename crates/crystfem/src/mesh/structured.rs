@@ -1,28 +1,28 @@
-//! Structured meshes: grid lines along the axes, and the boxes that are filled.
+//! Structured meshes: grid lines along the axes, and filled boxes.
 
 use crate::error::Error;
 use crate::mesh::split::{Split, split};
 use crate::mesh::{BOX_SIDES, Face, Mesh};
 
-/// Coordinates within this fraction of the extent are one.
+/// Coordinates within this fraction of the extent are equal.
 const SAME: f64 = 1e-9;
 
-/// Nodes of the largest mesh: 2²⁸, 15 GB of mesh alone; a slip in a size ends with a message instead of the
-/// machine.
+/// Largest number of nodes of a mesh: 2²⁸, or 15 GB of mesh alone, so that a typing error in a size gives a
+/// message instead of exhausting memory.
 pub(crate) const MAX_NODES: usize = 1 << 28;
 
 /// A named box, filled with elements.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Block {
-    /// Name of its element set.
+    /// Name of the element set.
     pub name: String,
-    /// Least coordinates, m.
+    /// Smallest coordinates, m.
     pub lower: [f64; 3],
-    /// Greatest coordinates, m.
+    /// Largest coordinates, m.
     pub upper: [f64; 3],
 }
 
-/// Grid lines along x, y and z, m, ascending: conforming hexahedra lie between them.
+/// Grid lines along x, y and z, m, ascending, with conforming hexahedra between them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
     /// Coordinates of the lines.
@@ -30,10 +30,11 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// Equal elements through a box.
+    /// Divides a box into equal elements.
     ///
     /// # Errors
-    /// A box without volume, no elements, or more nodes than 2²⁸.
+    /// [`Error::Mesh`] or [`Error::Parameter`] for a box without volume, no elements, and more than 2²⁸
+    /// nodes.
     pub fn uniform(lower: [f64; 3], upper: [f64; 3], elements: [usize; 3]) -> Result<Self, Error> {
         few_enough(elements.map(|count| count as f64))?;
         let mut lines = [const { Vec::new() }; 3];
@@ -58,10 +59,11 @@ impl Grid {
         Ok(grid)
     }
 
-    /// Lines through all faces of the blocks, and between them equal elements no longer than `size`.
+    /// Places lines at all faces of the blocks, and between them equal elements no longer than `size`.
     ///
     /// # Errors
-    /// No blocks, one without volume, a size that is not positive, or more nodes than 2²⁸.
+    /// [`Error::Mesh`] or [`Error::Parameter`] for no blocks, a block without volume, a size that is not
+    /// positive, and more than 2²⁸ nodes.
     pub fn through(blocks: &[Block], size: [f64; 3]) -> Result<Self, Error> {
         let mut lines = [const { Vec::new() }; 3];
         for (d, line) in lines.iter_mut().enumerate() {
@@ -83,11 +85,11 @@ impl Grid {
         Ok(grid)
     }
 
-    /// One block through the whole grid: hexahedra, an element set `name`, and surfaces and node sets on the
-    /// sides of the box, [`BOX_SIDES`].
+    /// Meshes the whole grid as one block: hexahedra, an element set `name`, and surfaces and node sets on
+    /// the sides of the box, [`BOX_SIDES`].
     ///
     /// # Errors
-    /// Lines that do not ascend, or more nodes than 2²⁸.
+    /// [`Error::Mesh`] or [`Error::Parameter`] for lines that do not ascend, and more than 2²⁸ nodes.
     pub fn mesh(&self, name: &str) -> Result<Mesh, Error> {
         self.check()?;
         let end = |line: &Vec<f64>, first: bool| if first { line[0] } else { line[line.len() - 1] };
@@ -95,23 +97,23 @@ impl Grid {
         self.blocks(&[Block { name: name.to_owned(), lower, upper }], Split::Hexahedra)
     }
 
-    /// Elements between the lines inside any block, sets of the elements in each block (blocks may overlap:
-    /// an element is in the set of each), and surfaces and node sets on the sides of the box around all,
-    /// [`BOX_SIDES`].
+    /// Meshes the cells inside any block, with element sets of the blocks (which may overlap: an element is
+    /// in the set of each), and surfaces and node sets on the sides of the bounding box, [`BOX_SIDES`].
     ///
     /// # Errors
-    /// Lines that do not ascend, a block without volume or without an element, or more nodes than 2²⁸.
+    /// [`Error::Mesh`] or [`Error::Parameter`] for lines that do not ascend, a block without volume or
+    /// elements, and more than 2²⁸ nodes.
     pub fn blocks(&self, blocks: &[Block], cells: Split) -> Result<Mesh, Error> {
         self.check()?;
         let [nx, ny, nz] = self.lines.each_ref().map(|line| line.len() - 1);
         let mut ranges = Vec::with_capacity(blocks.len());
         for block in blocks {
             block.check()?;
-            // a cell is inside by its middle
+            // the centre of a cell decides
             let range: [_; 3] = std::array::from_fn(|d| {
                 let line = &self.lines[d];
                 let cells = &line[..line.len() - 1];
-                // middles ascend: of a thousand layers each is found in ten looks
+                // centres ascend: binary search takes ten comparisons for a thousand layers
                 let until = |end: f64| {
                     let (mut low, mut high) = (0, cells.len());
                     while low < high {
@@ -150,12 +152,13 @@ impl Grid {
         Ok(split(mesh, &odd, cells))
     }
 
-    /// A hexahedron in each filled cell, x fastest: element sets `name` and, of each layer of cells with an
-    /// element, `layer-1`, … upwards, surfaces and node sets on the sides of the box around all,
+    /// Meshes each filled cell by a hexahedron, x fastest: element sets `name` and, of each layer of cells
+    /// with an element, `layer-1`, … upwards, surfaces and node sets on the sides of the bounding box,
     /// [`BOX_SIDES`].
     ///
     /// # Errors
-    /// Lines that do not ascend, more nodes than 2²⁸, another number of cells, or none that is filled.
+    /// [`Error::Mesh`] or [`Error::Parameter`] for lines that do not ascend, more than 2²⁸ nodes, another
+    /// number of cells, and no filled cell.
     pub(crate) fn cells(&self, name: &str, filled: &[bool]) -> Result<Mesh, Error> {
         self.check()?;
         let [nx, ny, nz] = self.lines.each_ref().map(|line| line.len() - 1);
@@ -177,7 +180,7 @@ impl Grid {
         Ok(mesh)
     }
 
-    /// Numbers filled cells and their nodes, x fastest; `odd` tells the parity of i + j + k of each element.
+    /// Numbers filled cells and their nodes, x fastest; `odd` is the parity of i + j + k of each element.
     fn number(&self, element_of: &mut [u32], mesh: &mut Mesh, odd: &mut Vec<bool>) {
         let [nx, ny, nz] = self.lines.each_ref().map(|line| line.len() - 1);
         // corners of two layers of nodes at a time: lower and upper
@@ -194,7 +197,7 @@ impl Grid {
             let [below, above] = &mut layers;
             above.fill(u32::MAX);
             for (j, i) in (0..=ny).flat_map(|j| (0..=nx).map(move |i| (j, i))) {
-                // node (i, j, k) is a corner of up to eight cells; wrapping makes −1 no cell
+                // node (i, j, k) is a corner of up to eight cells; wrapping excludes −1
                 let used = (0..8).any(|c| {
                     let [i, j, k] =
                         [i.wrapping_sub(c & 1), j.wrapping_sub(c >> 1 & 1), k.wrapping_sub(c >> 2)];
@@ -220,7 +223,7 @@ impl Grid {
         mesh.points.shrink_to_fit();
     }
 
-    /// Surfaces and node sets on the sides of the box around the filled cells.
+    /// Builds surfaces and node sets on the sides of the bounding box of the filled cells.
     fn sides(&self, element_of: &[u32], mesh: &mut Mesh) {
         let n = self.lines.each_ref().map(|line| line.len() - 1);
         let cell = |at: [usize; 3]| element_of[at[0] + n[0] * (at[1] + n[1] * at[2])];
@@ -253,7 +256,7 @@ impl Grid {
         }
     }
 
-    /// Lines ascend and the nodes can be numbered.
+    /// Checks that lines ascend and that the nodes can be numbered.
     fn check(&self) -> Result<(), Error> {
         for (line, axis) in self.lines.iter().zip(["x", "y", "z"]) {
             if line.len() < 2 {
@@ -272,7 +275,7 @@ impl Grid {
     }
 }
 
-/// Refuses elements along each axis whose nodes cannot be numbered.
+/// Refuses numbers of elements along each axis whose nodes cannot be numbered.
 pub(crate) fn few_enough(elements: [f64; 3]) -> Result<(), Error> {
     let nodes: f64 = elements.iter().map(|count| count + 1.0).product();
     if nodes <= MAX_NODES as f64 {
@@ -297,11 +300,12 @@ impl Block {
     }
 }
 
-/// Lengths of elements that fill `length`: the first is at most `first`, each `growth` times the one before.
+/// Lengths of elements that fill `length`: the first at most `first`, each `growth` times the one before.
 /// Their sum is `length` to rounding.
 ///
 /// # Errors
-/// A length or first element that is not positive, a growth below 1, or more than 2²⁸ elements.
+/// [`Error::Parameter`] for a length or first element that is not positive, a growth below 1, and more than
+/// 2²⁸ elements.
 pub fn graded(length: f64, first: f64, growth: f64) -> Result<Vec<f64>, Error> {
     let count = count(length, first, growth)?;
     let relative: Vec<f64> = (0..count as i32).map(|k| growth.powi(k)).collect();
@@ -309,7 +313,7 @@ pub fn graded(length: f64, first: f64, growth: f64) -> Result<Vec<f64>, Error> {
     Ok(relative.into_iter().map(|part| length * (part / sum)).collect())
 }
 
-/// How many elements [`graded`] makes.
+/// Number of elements of [`graded`].
 pub(crate) fn count(length: f64, first: f64, growth: f64) -> Result<f64, Error> {
     for (name, found) in [("length", length), ("element size", first)] {
         if !(found > 0.0 && found.is_finite()) {
@@ -333,7 +337,7 @@ pub(crate) fn count(length: f64, first: f64, growth: f64) -> Result<f64, Error> 
     Ok(count.ceil().max(1.0))
 }
 
-/// Ascending coordinates, those closer than [`SAME`] of the extent taken as one.
+/// Sorts coordinates; those closer than [`SAME`] of the extent become one.
 fn unique(mut values: Vec<f64>) -> Vec<f64> {
     values.sort_unstable_by(f64::total_cmp);
     let extent = values.last().zip(values.first()).map_or(0.0, |(last, first)| last - first);

@@ -7,17 +7,18 @@ use crate::mesh::{BOX_SIDES, Face, Mesh};
 /// No neighbour.
 const NONE: u32 = u32::MAX;
 
-/// The outer surface of the active elements: faces with exactly one active element. Neighbours are found
-/// once; each activation touches only the faces of the new elements.
+/// Outer surface of the active elements: faces with exactly one active element. Neighbours are found once;
+/// each activation updates only the faces of the new elements.
 #[derive(Clone, Debug)]
 pub struct Surface {
-    /// Number of hexahedra and of elements.
+    /// Number of hexahedra.
     hexahedra: usize,
+    /// Number of elements.
     elements: usize,
-    /// First face of each of the other elements, and where the last ends.
+    /// First face of each of the other elements, and the end of the last one's.
     firsts: Vec<u32>,
-    /// The face on the other side of each face, or [`NONE`]; faces numbered 6·element + side, then 4·… for
-    /// tetrahedra, then those of the others.
+    /// Opposite face of each face, or [`NONE`]; faces are numbered 6·element + side, then 4·… for tetrahedra,
+    /// then those of the others.
     opposite: Vec<u32>,
     active: Vec<bool>,
     outer: Vec<bool>,
@@ -26,13 +27,13 @@ pub struct Surface {
 /// Change of the outer surface by an activation; faces sorted.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Change {
-    /// Faces that are outer now.
+    /// Faces that became outer faces.
     pub appeared: Vec<Face>,
-    /// Faces that were outer before.
+    /// Faces that are no longer outer faces.
     pub vanished: Vec<Face>,
 }
 
-/// A part of space in which faces may become outer ones; see [`Surface::region`].
+/// A set of faces that may become outer faces; see [`Surface::region`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Region {
     /// Face numbers, sorted.
@@ -40,11 +41,11 @@ pub struct Region {
 }
 
 impl Surface {
-    /// Neighbours of a mesh; no element is active.
+    /// Finds the neighbours in a mesh; no element is active.
     ///
     /// # Errors
-    /// A node that is none, a face of three elements (named), two elements with the corners of one face and
-    /// different nodes on its edges, or more than 2³² − 1 faces.
+    /// [`Error::Mesh`] for a node out of range, a face of three elements (named), and two elements with the
+    /// same corners of a face and different mid-edge nodes; [`Error::Parameter`] for more than 2³² − 1 faces.
     pub fn new(mesh: &Mesh) -> Result<Self, Error> {
         let (hexahedra, elements) = (mesh.hexahedra.len(), mesh.element_count());
         let mut count = 6 * hexahedra + 4 * mesh.tetrahedra.len();
@@ -69,10 +70,10 @@ impl Surface {
         Ok(surface)
     }
 
-    /// The outer surface of the whole mesh.
+    /// Returns the outer surface of the whole mesh.
     ///
     /// # Errors
-    /// See [`Self::new`].
+    /// Errors of [`Self::new`].
     pub fn of_all(mesh: &Mesh) -> Result<Self, Error> {
         let mut surface = Self::new(mesh)?;
         surface.active.fill(true);
@@ -82,10 +83,10 @@ impl Surface {
         Ok(surface)
     }
 
-    /// Activates elements; those active already are passed over.
+    /// Activates elements; active ones are skipped.
     ///
     /// # Errors
-    /// An element that is none; nothing is changed then.
+    /// [`Error::Parameter`] for an element out of range, without any change.
     pub fn activate(&mut self, elements: &[u32]) -> Result<Change, Error> {
         if let Some(element) = elements.iter().find(|element| **element as usize >= self.elements) {
             let allowed = format!("below {}", self.elements);
@@ -121,29 +122,30 @@ impl Surface {
             .map(|number| self.face(number))
     }
 
-    /// Returns whether each element is active.
+    /// Active elements.
     pub fn active(&self) -> &[bool] {
         &self.active
     }
 
-    /// Returns whether a face belongs to the outer surface.
+    /// Returns true if a face belongs to the outer surface.
     pub fn is_outer(&self, face: Face) -> bool {
         self.number(face).is_some_and(|number| self.outer[number as usize])
     }
 
-    /// The same face seen from the other element that has it.
+    /// Returns the same face as a face of the other element.
     pub fn opposite(&self, face: Face) -> Option<Face> {
         let opposite = self.opposite[self.number(face)? as usize];
         (opposite != NONE).then(|| self.face(opposite))
     }
 
-    /// Where a boundary condition acts: `outer` (everywhere), a named surface (from whichever side its faces
-    /// are given), the part of the surface of a named element set, the faces whose nodes are all in a named
-    /// node set, or a side of the box around the mesh ([`BOX_SIDES`]: faces within 1e-9 of its diagonal). A
-    /// name of the mesh comes before our own.
+    /// Finds the region of a boundary condition: `outer` (everywhere), a named surface (given from either
+    /// side), the surface of a named element set, the faces with all nodes in a named node set, or a side of
+    /// the bounding box ([`BOX_SIDES`]: faces within 1e-9 of its diagonal). Names of the mesh take
+    /// precedence.
     ///
     /// # Errors
-    /// A name that is none of them, or a named surface with a face that does not exist.
+    /// [`Error::Unknown`] for another name, and [`Error::Mesh`] for a named surface with a face that does not
+    /// exist.
     pub fn region(&self, mesh: &Mesh, name: &str) -> Result<Region, Error> {
         let mut faces = Vec::new();
         if let Some(named) = mesh.surfaces.get(name) {
@@ -200,7 +202,7 @@ impl Surface {
         Ok(Region { faces })
     }
 
-    /// The part of the outer surface in a region, ascending.
+    /// Outer faces in a region, ascending.
     pub fn faces_in(&self, region: &Region) -> Vec<Face> {
         let outer = |number: &&u32| self.outer.get(**number as usize) == Some(&true);
         region.faces.iter().filter(outer).map(|number| self.face(*number)).collect()
@@ -245,8 +247,8 @@ impl Surface {
         }
     }
 
-    /// Sorts faces into buckets by their least node and pairs those of equal nodes: linear in the mesh, and
-    /// the same whatever the order of anything else.
+    /// Sorts faces into buckets by their smallest node and pairs those with equal nodes: linear in the mesh,
+    /// and independent of any order.
     fn neighbours(&self, mesh: &Mesh) -> Result<Vec<u32>, Error> {
         let key = |number: u32| mesh.face_nodes(self.face(number)).key();
         let all = |number: u32| {
@@ -371,7 +373,7 @@ mod tests {
         assert!((total(&mesh, surface.faces()) / glass - 1.0).abs() < 1e-12);
         for layer in 1..=4 {
             let change = surface.activate(&mesh.element_sets[&format!("layer-{layer}")]).unwrap();
-            // the new layer covers as much as its own top shows; its sides are added
+            // the new layer covers as much as its own top exposes; its sides are added
             assert_eq!(change.vanished.len(), 20 * 4);
             assert_eq!(change.appeared.len(), 20 * 4 + 2 * 2 * (20 + 4));
             let exact = glass + 2.0 * 0.024 * 2e-4 * f64::from(layer);
@@ -412,7 +414,7 @@ mod tests {
         assert_eq!(surface.faces_in(&outer), surface.faces().collect::<Vec<_>>());
         let upper = surface.faces_in(&surface.region(&mesh, "upper").unwrap());
         assert!((total(&mesh, upper) - 5.0).abs() < 1e-14);
-        // by name and by place
+        // by name and by position
         let named = surface.faces_in(&surface.region(&mesh, "left").unwrap());
         let mut bare = mesh.clone();
         bare.surfaces.clear();
