@@ -1,4 +1,4 @@
-//! Sets and surfaces of an input file, by their members.
+//! Sets and surfaces of an input file, resolved to their members.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -9,7 +9,7 @@ use crate::mesh::file_mesh::{Content, Labels};
 use crate::mesh::surface::Surface;
 use crate::mesh::{Cell, Face, Mesh, Shape};
 
-/// What a set is of.
+/// Kind of a set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum SetKind {
     Nodes,
@@ -20,17 +20,17 @@ pub(super) enum SetKind {
     Faces,
 }
 
-/// One data line of a set.
+/// A data line of a set.
 #[derive(Debug)]
 pub(super) enum Entry {
     Label(u64),
     Range([u64; 3]),
     Set(String),
-    /// A number or set of elements and a side, or `None`: those outside.
+    /// A label or set of elements and a side, or `None` for outer sides.
     Side(Box<Entry>, Option<u8>),
 }
 
-/// A set as the file gives it.
+/// A set as written in the file.
 #[derive(Debug)]
 pub(super) struct Set {
     pub name: String,
@@ -46,23 +46,23 @@ impl Entry {
     }
 }
 
-/// Sets by their members, once all are known.
+/// Resolves sets to their members, once all are known.
 pub(super) struct Resolver<'a> {
     pub path: &'a Path,
     pub nodes: &'a Labels,
     pub elements: &'a Labels,
-    /// Members that may still be visited, in proportion to the file: sets of sets and of ranges cannot run
-    /// away.
+    /// Limit on further members, in proportion to the file, so that nested sets and ranges cannot grow
+    /// without bound.
     pub budget: usize,
 }
 
 impl Resolver<'_> {
-    /// Names what the file names.
+    /// Resolves all sets into `content`.
     ///
     /// # Errors
-    /// Members that do not exist or are too many.
+    /// [`Error::File`] for members that do not exist or are too many.
     pub fn resolve(&mut self, sets: Vec<Set>, content: &mut Content) -> Result<(), Error> {
-        // names in upper case, with the letters of their first use
+        // names in upper case, with the letter case of their first use
         let mut node_sets: BTreeMap<String, (String, Vec<u32>)> = BTreeMap::new();
         let mut element_sets: BTreeMap<String, (String, Vec<u32>)> = BTreeMap::new();
         let mut faces: BTreeMap<String, (String, Vec<Face>)> = BTreeMap::new();
@@ -128,7 +128,7 @@ impl Resolver<'_> {
         }
     }
 
-    /// Positions of the members of an entry.
+    /// Collects the indices of the members of an entry.
     fn members(
         &mut self,
         line: usize,
@@ -168,7 +168,7 @@ impl Resolver<'_> {
         Ok(())
     }
 
-    /// Sides of elements; without a side those that no other element shares.
+    /// Collects sides of elements; outer sides if none is given.
     fn sides(
         &mut self,
         line: usize,
@@ -181,7 +181,7 @@ impl Resolver<'_> {
         self.count_work(line, 6 * members.len())?;
         for place in members {
             let element = &content.elements[*place as usize];
-            // shells and lines have no sides of their own
+            // shells and lines have no sides
             let sides = element.kind.solid().map_or(0, Shape::side_count);
             match side {
                 Some(side) if side < sides => found.push(Face { element: *place, side }),
@@ -207,13 +207,13 @@ impl Resolver<'_> {
     }
 }
 
-/// Sides of solid elements that no other shares, by the element's position.
+/// Returns the sides of solid elements that no other shares, by the element's index.
 fn outer_sides(content: &Content, nodes: &Labels) -> Result<BTreeMap<u32, Vec<u8>>, Error> {
     let mut mesh = Mesh { points: vec![[0.0; 3]; content.nodes.len()], ..Mesh::default() };
     let mut places = [const { Vec::new() }; 3];
     for (place, element) in (0u32..).zip(&content.elements) {
         let Some(shape) = element.kind.solid() else { continue };
-        // nodes that do not exist are named when the mesh is made
+        // missing nodes are reported when the mesh is made
         let own: Vec<u32> = content.nodes_of(element).iter().filter_map(|label| nodes.get(*label)).collect();
         if own.len() < shape.nodes() {
             continue;

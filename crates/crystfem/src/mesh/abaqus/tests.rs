@@ -16,7 +16,7 @@ fn refused(text: &str, words: &[&str]) {
     assert!(words.iter().all(|word| error.contains(word)), "{error}");
 }
 
-/// Two boxes of 3 × 1 × 1, one on the other, written by Gmsh 4.15, groups of surfaces as plane elements.
+/// Two stacked boxes of 3 × 1 × 1, written by Gmsh 4.15, with groups of surfaces as plane elements.
 #[test]
 fn meshes_written_by_gmsh() {
     for name in ["hexes.inp", "tets.inp"] {
@@ -168,13 +168,13 @@ fn what_is_wrong_is_named_with_its_line() {
 
 #[test]
 fn sets_cannot_multiply_beyond_the_file() {
-    // each set twice the one before: 2⁶⁰ members without a bound
+    // each set doubles the one before: 2⁶⁰ members without a bound
     let doubling: String = (0..60).map(|k| format!("*NSET,NSET=s{}\ns{k},s{k}\n", k + 1)).collect();
     refused(&format!("{BRICK}*NSET,NSET=s0\n1\n{doubling}"), &["members of sets"]);
 }
 
 /// One element of each type in the order of nodes and sides of the Abaqus manual (28.1.4, three-dimensional
-/// solids), with nodes on edges where that order has them: a wrong one would fold the element.
+/// solids), with mid-edge nodes in that order: a wrong one would fold the element.
 #[test]
 fn elements_of_all_types() {
     let places: [[f64; 3]; 8] = [
@@ -231,7 +231,7 @@ fn elements_of_all_types() {
             assert!(nodes.iter().all(|node| read.mesh.points[*node as usize][axis] == at), "{kind} {side}");
         }
         assert_eq!(read.mesh.surfaces["skin"].len(), usize::from(read.mesh.side_count(0)));
-        // two nodes of an edge exchanged: folded, and named
+        // two nodes of an edge exchanged: folded, and reported
         if !edges.is_empty() {
             let folded =
                 text.replace("*ELEMENT", "*NODE\n900, -9., 0., 0.\n*ELEMENT").replace("\n7, 1,", "\n7, 900,");
@@ -256,7 +256,7 @@ fn orders_do_not_mix() {
     assert!(error.contains("elements 0 and 1 have the corners of one face and different nodes"), "{error}");
 }
 
-/// Lists keywords with a meaning here one by one, with their number and first values.
+/// Lists keywords with an equivalent one by one, with their count and first values.
 #[test]
 fn what_is_not_used_says_what_to_give_instead() {
     let more = "*Tie, name=glue\na, b\n*Dflux\nBricks, BF, 1.\n*DFLUX, amplitude=RAMP\nagain, BF, 2.\n*initial conditions, type=temperature\nAll, 20.\n\
@@ -272,7 +272,7 @@ fn what_is_not_used_says_what_to_give_instead() {
     }
 }
 
-/// An instance is moved, then turned about a line.
+/// An instance is translated, then rotated about a line.
 #[test]
 fn instances_are_placed() {
     let with = |lines: &str| BRICK.replace("*End Instance", &format!("{lines}\n*End Instance"));
@@ -289,7 +289,7 @@ fn instances_are_placed() {
     }
 }
 
-/// Files in files, with data lines alone or keywords, and errors at their lines.
+/// Includes work for nested files, with data lines alone or keywords, and errors point to their lines.
 #[test]
 fn files_are_included() {
     let directory = tempfile::tempdir().unwrap();

@@ -12,7 +12,7 @@ fn refused(text: &str, words: &[&str]) {
     assert!(words.iter().all(|word| error.contains(word)), "{error}");
 }
 
-/// Two boxes of 3 × 1 × 1, one on the other, meshed by Gmsh 4.15 and saved as 4.1, 4.0 and 2.2.
+/// Two stacked boxes of 3 × 1 × 1, meshed by Gmsh 4.15 and saved as 4.1, 4.0 and 2.2.
 #[test]
 fn meshes_written_by_gmsh() {
     for name in [
@@ -73,7 +73,7 @@ fn a_mesh_written_by_meshio() {
     assert!((read.quality.volume - 1.0).abs() < 1e-15 && read.notes.is_empty());
 }
 
-/// [`TETRAHEDRON`] in bytes: either order, sizes of 4 and of 8 bytes.
+/// [`TETRAHEDRON`] in binary: either byte order, sizes of 4 and of 8 bytes.
 #[test]
 fn bytes_in_either_order_and_width() {
     let text = parse(Path::new("a.msh"), TETRAHEDRON.as_bytes(), 1.0).unwrap();
@@ -181,8 +181,8 @@ fn groups_cannot_multiply_beyond_the_file() {
     refused(&text, &["members of physical groups"]);
 }
 
-/// A quarter of a ring, radii 1 and 2, height 1, one element high, of second order on curved edges; written
-/// by Gmsh 4.15 in both formats, whose orders of nodes differ.
+/// A quarter of a ring, radii 1 and 2, height 1, one element high, with curved second-order edges; written by
+/// Gmsh 4.15 in both formats, which differ in node order.
 #[test]
 fn second_order_meshes_written_by_gmsh() {
     for (name, count) in [("second_hexes", 3), ("second_wedges", 6), ("second_tets", 18)] {
@@ -198,7 +198,7 @@ fn second_order_meshes_written_by_gmsh() {
                 let total: f64 = mesh.surfaces[surface].iter().map(|face| area(mesh, *face)).sum();
                 assert!((total / exact - 1.0).abs() < 1e-3, "{name} {surface} {total}");
             }
-            // nodes on the middles of edges lie near them
+            // mid-edge nodes lie near the middles
             for cell in &mesh.others {
                 let nodes = cell.nodes();
                 for (&[p, q], middle) in cell.shape.edges().iter().zip(&nodes[cell.shape.corners()..]) {
@@ -209,7 +209,7 @@ fn second_order_meshes_written_by_gmsh() {
             }
         }
         assert!((msh.quality.volume / inp.quality.volume - 1.0).abs() < 1e-12);
-        // the same nodes at the same places in each element
+        // the same nodes at the same positions in each element
         for (a, b) in msh.mesh.others.iter().zip(&inp.mesh.others) {
             for (a, b) in a.nodes().iter().zip(b.nodes()) {
                 assert!((msh.mesh.point(*a) - inp.mesh.point(*b)).norm() < 1e-12, "{name}");
@@ -224,19 +224,19 @@ fn second_order_meshes_written_by_gmsh() {
     }
 }
 
-/// The two boxes of complete second order: 27 nodes of each hexahedron, 20 are kept.
+/// Hexahedra of complete second order, in the two boxes, keep 20 of their 27 nodes.
 #[test]
 fn complete_second_order_is_reduced() {
     let read = read(&fixture("hexes27.msh").0, 1e-3).unwrap();
     assert!(read.mesh.others.len() == 16 && read.mesh.is_second_order());
     assert!((read.quality.volume / 6e-9 - 1.0).abs() < 1e-12);
     assert!(read.notes[0].contains("16 elements of complete second order"), "{:?}", read.notes);
-    // faces of their surfaces are found, by nodes that are kept
+    // faces of their surfaces are found by the kept nodes
     let total: f64 = read.mesh.surfaces["bottom"].iter().map(|face| area(&read.mesh, *face)).sum();
     assert!((total / 3e-6 - 1.0).abs() < 1e-12);
 }
 
-/// One tetrahedron in all versions, by hand: parametric nodes, several groups, no groups, comments, negative
+/// A tetrahedron in all versions, by hand: parametric nodes, several groups, no groups, comments, negative
 /// tags.
 #[test]
 fn versions_by_hand() {

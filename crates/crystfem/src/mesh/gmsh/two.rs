@@ -1,4 +1,4 @@
-//! Version 2 of the format: nodes one by one, elements with their tags
+//! Version 2 of the format: a list of nodes, and elements with their tags
 //! (<https://gmsh.info/doc/texinfo/gmsh.html#MSH-file-format-version-2-_0028Legacy_0029>).
 
 use std::collections::HashMap;
@@ -7,7 +7,7 @@ use super::{Kind, Numbers, Reader, kind_of, place, whole};
 use crate::error::Error;
 use crate::mesh::file_mesh::Node;
 
-/// Tags of an element at most: a group, an entity, partitions.
+/// Limit on the tags of an element: groups, an entity, partitions.
 const TAGS: i64 = 10_000;
 
 impl Reader {
@@ -19,12 +19,12 @@ impl Reader {
         Ok(())
     }
 
-    /// Solids that are there once in each of their groups become one.
+    /// Reads elements; solids repeated for each of their groups become one.
     pub(super) fn elements_of_two(&mut self, numbers: &mut Numbers) -> Result<(), Error> {
         let (all, mut read, mut again) = (count(numbers, "number of elements")?, 0, 0);
         let mut known: HashMap<Vec<u64>, u32> = HashMap::new();
         while read < all {
-            // bytes come in blocks of one type
+            // binary elements come in blocks of one type
             let binary = numbers.is_binary();
             let (mut label, mut block) = (0, 1);
             if !binary {
@@ -77,7 +77,7 @@ impl Reader {
     }
 }
 
-/// A count on a line of its own, text in binary files too.
+/// Reads a count on its own line, text in binary files too.
 fn count(numbers: &mut Numbers, what: &str) -> Result<u64, Error> {
     let line = numbers.text_line();
     line.trim().parse().map_err(|_| numbers.error(what, line, "a count"))

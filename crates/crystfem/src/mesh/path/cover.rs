@@ -1,4 +1,4 @@
-//! When a bead covers the centres of elements.
+//! Times at which a bead covers the centres of elements.
 
 use polycore::numerics::bounds;
 use std::collections::BTreeMap;
@@ -9,7 +9,7 @@ use super::{Move, ToolPath};
 use crate::error::Error;
 use crate::mesh::Mesh;
 
-/// Cross-section of what is laid down: below the nozzle, to both sides of its path, round at the ends.
+/// Cross-section of a bead: below the nozzle, to both sides of its path, with round ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bead {
     /// Width, m.
@@ -18,22 +18,22 @@ pub struct Bead {
     pub height: f64,
 }
 
-/// When elements are covered: when the nozzle is nearest to the centre of an element, in the first move whose
-/// bead holds that centre.
+/// Times at which elements are covered: when the nozzle is nearest to the centre of an element, in the first
+/// move whose bead contains that centre.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Activation {
-    /// Time of each element of the mesh, s: −∞ for those not requested, +∞ for those never covered.
+    /// Time of each element of the mesh, s: −∞ if not requested, +∞ if never covered.
     pub times: Vec<f64>,
     /// Elements never covered, ascending.
     pub missed: Vec<u32>,
-    /// Heights z of printing moves, each with the end of the last one there, s.
+    /// Heights z of printing moves, with the end time of the last one at each, s.
     levels: Vec<(f64, f64)>,
     height: f64,
 }
 
 impl Activation {
-    /// Gives elements never covered the time at which the last bead at their height was finished, as if gaps
-    /// between beads were filled. Those with no bead at their height remain missed; their number comes back.
+    /// Assigns elements never covered the end time of the last bead at their height, as if gaps between beads
+    /// were filled. Returns the number of elements without a bead at their height, which remain missed.
     pub fn fill(&mut self, mesh: &Mesh) -> usize {
         let (levels, height) = (&self.levels, self.height);
         let times = &mut self.times;
@@ -51,13 +51,13 @@ impl Activation {
     }
 }
 
-/// Greatest place, m, and time, s, of a move: beyond any printer, and its square far from overflow.
+/// Largest position, m, and time, s, of a move: beyond any printer, and with a square far from overflow.
 const FAR: f64 = 1e12;
 
-/// Cells over the elements' extent along each axis, at most.
+/// Largest number of cells along each axis.
 const CELLS: f64 = 512.0;
 
-/// Centres of elements, sorted by the cell of a grid over x and y that they are in, then by z.
+/// Centres of elements, sorted by cell of a grid over x and y, then by z.
 struct Centres {
     lower: [f64; 2],
     upper: [f64; 2],
@@ -80,7 +80,7 @@ impl Centres {
         all
     }
 
-    /// Column and row of a place, those outside moved to the border.
+    /// Column and row of a position, clamped to the grid.
     fn index(&self, place: [f64; 2]) -> [u64; 2] {
         // a cast saturates, so nothing below zero remains
         [0, 1].map(|d| ((place[d].min(self.upper[d]) - self.lower[d]) / self.size) as u64)
@@ -91,7 +91,7 @@ impl Centres {
         column * self.rows + row
     }
 
-    /// Centres with z in (low, high] in a cell: as numbers of `places`, with their z.
+    /// Centres with z in (low, high] in a cell, as indices of `places`, with their z.
     fn in_cell(&self, cell: u64, [low, high]: [f64; 2]) -> impl Iterator<Item = (f64, usize)> + '_ {
         let first =
             self.sorted.partition_point(|entry| entry.0 < cell || (entry.0 == cell && entry.1 <= low));
@@ -145,14 +145,14 @@ pub(super) fn activation(
     Ok(Activation { missed: missed.collect(), times, levels, height: bead.height })
 }
 
-/// Covers centres by one move.
+/// Covers centres by a move.
 fn lay(one: &Move, centres: &Centres, bead: Bead, earliest: &mut [f64]) {
     let radius = 0.5 * bead.width;
     let from = Vector2::new(one.from[0], one.from[1]);
     let along = Vector2::new(one.to[0], one.to[1]) - from;
     let square = along.norm_squared();
     let Some([first, last]) = clip(from, along, centres, radius) else { return };
-    // pieces no longer than four cells, so that the boxes around slanted ones hold few centres
+    // pieces no longer than four cells, so that the boxes around slanted ones contain few centres
     let pieces = ((last - first) * square.sqrt() / (4.0 * centres.size)).ceil().clamp(1.0, CELLS) as u32;
     let rise = one.to[2] - one.from[2];
     for piece in 0..pieces {
@@ -178,7 +178,7 @@ fn lay(one: &Move, centres: &Centres, bead: Bead, earliest: &mut [f64]) {
     }
 }
 
-/// The part of a move within reach of the centres, as shares of it; `None` where there is none.
+/// Clips a move to the reach of the centres, as fractions of it; `None` if outside.
 fn clip(from: Vector2<f64>, along: Vector2<f64>, centres: &Centres, radius: f64) -> Option<[f64; 2]> {
     let (mut first, mut last) = (0.0f64, 1.0f64);
     for d in 0..2 {

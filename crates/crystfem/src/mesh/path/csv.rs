@@ -7,11 +7,10 @@ use polycore::units::dimension::{LengthDimension, RatioDimension, TimeDimension}
 use std::path::Path;
 
 /// Reads a path from a CSV table with columns `time [unit]` (not descending), `x [unit]`, `y [unit]`, `z
-/// [unit]`, in s and m where a heading has no unit, and `print`: not 0 where the move that ends there lays
-/// material down.
+/// [unit]`, by default in s and m, and `print`: nonzero if the move that ends there deposits material.
 ///
 /// # Errors
-/// As [`crate::table::read`]; times that descend.
+/// Errors of [`crate::table::read`]; [`Error::File`] for times that descend.
 pub fn read_csv(path: &Path) -> Result<ToolPath, Error> {
     let length = |name| Column::of::<LengthDimension>(name).or_unit("m");
     let columns = [

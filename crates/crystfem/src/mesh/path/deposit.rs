@@ -1,65 +1,64 @@
-//! A mesh of what a path lays down: cells, each with the part of it that is filled.
+//! Mesh of a tool path: cells with their fill fractions.
 
 use super::{Move, ToolPath};
 use crate::error::Error;
 use crate::mesh::voxels::{Frame, Voxels};
 use polycore::numerics::bounds;
 
-/// Pieces of a cell along each axis in which the bead's volume is counted.
+/// Number of pieces per cell along each axis for the volume of beads.
 const PIECES: f64 = 4.0;
-/// Pieces across and down a bead at least, and at most.
+/// Smallest number of pieces across and down a bead.
 const FEW: f64 = 2.0;
+/// Largest number of pieces across and down a bead.
 const MANY: f64 = 64.0;
 
-/// Cells of a grid that starts at multiples of their size.
+/// Settings of the cells of a grid, at multiples of their size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cells {
     /// Edge lengths, m.
     pub size: [f64; 3],
     /// Diameter of the filament, m.
     pub filament: f64,
-    /// Height of all beads, m; `None`: as the file tells, or down to what lies below.
+    /// Height of all beads, m; `None`: from the file, or down to the layer below.
     pub height: Option<f64>,
-    /// Cells with a smaller filled part are left out; the volume in them goes to the others in equal
-    /// proportion.
+    /// Smallest fill fraction; the volume in emptier cells is distributed over the others in proportion.
     pub least: f64,
 }
 
 impl Cells {
-    /// Cells of these edges, m, for filament of 1.75 mm: beads as high as the file tells, cells that are a
-    /// tenth full.
+    /// Returns cells of these edges, m, for filament of 1.75 mm, bead heights from the file, and a smallest
+    /// fill fraction of a tenth.
     pub fn new(size: [f64; 3]) -> Self {
         Self { size, filament: super::FILAMENT, height: None, least: 0.1 }
     }
 }
 
-/// What a path lays down.
+/// Deposited material as cells.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Deposit {
-    /// The cells in which something is.
+    /// Filled cells.
     pub voxels: Voxels,
-    /// When half of what is in each element is there, s.
+    /// Time at which half of each element's filling is deposited, s.
     pub times: Vec<f64>,
-    /// The tool that laid most of each element, where several print: then element sets `tool-0` and so on are
-    /// theirs.
+    /// Tool that deposits most of each element, if several print; then there are element sets `tool-0`, ….
     pub tools: Vec<u16>,
 }
 
 impl ToolPath {
-    /// Cells along each axis of the grid around all beads, before any of them is made.
+    /// Number of cells along each axis of the grid around all beads, before any is made.
     ///
     /// # Errors
-    /// See [`Self::deposit`].
+    /// Errors of [`Self::deposit`].
     pub fn cells(&self, cells: &Cells) -> Result<[f64; 3], Error> {
         Ok(frame(&self.beads(cells)?, cells)?.counts().map(|count| count as f64))
     }
 
-    /// The cells that beads fill: each bead is a box of its volume, as wide as its cross-section over its
-    /// height, below the nozzle, which is counted in pieces of a quarter of a cell.
+    /// Builds the cells filled by beads. Each bead is a box of its volume below the nozzle, as wide as its
+    /// cross-section over its height, and is divided into pieces of a quarter of a cell.
     ///
     /// # Errors
-    /// Sizes that are not positive, a path that extrudes nothing, a bead without height, more cells than can
-    /// be numbered, and a least filled part that leaves none.
+    /// [`Error::Parameter`] or [`Error::Mesh`] for sizes that are not positive, a path without extrusion, a
+    /// bead without height, too many cells, and a smallest fill fraction that leaves no cell.
     pub fn deposit(&self, cells: &Cells) -> Result<Deposit, Error> {
         let beads = self.beads(cells)?;
         let frame = frame(&beads, cells)?;
@@ -71,7 +70,7 @@ impl ToolPath {
             pieces(one, *height, cells, |at, own, _| filled[frame.cell(at)] += own);
         }
         let (mut voxels, taken) = frame.voxels(&filled, cells.least, volume)?;
-        // when half of what a cell takes is in it
+        // time at which half of a cell's filling is deposited
         let mut sum = vec![0.0; count];
         let mut times = vec![f64::INFINITY; count];
         for (one, height) in &beads {
@@ -94,7 +93,7 @@ impl ToolPath {
         Ok(Deposit { voxels, times, tools })
     }
 
-    /// Printing moves that feed filament, and the heights of their beads.
+    /// Printing moves that feed filament, with the heights of their beads.
     fn beads(&self, cells: &Cells) -> Result<Vec<(&Move, f64)>, Error> {
         let positive = |name, found: f64| match found > 0.0 && found.is_finite() {
             true => Ok(()),
@@ -122,7 +121,7 @@ impl ToolPath {
     }
 }
 
-/// The tool that lays most in each cell; nothing where one prints all.
+/// Returns the tool that deposits most in each cell; empty for a single tool.
 fn by_tool(beads: &[(&Move, f64)], frame: &Frame, cells: &Cells, count: usize) -> Vec<u16> {
     let mut known: Vec<u16> = beads.iter().map(|(one, _)| one.tool).collect();
     known.sort_unstable();
@@ -145,7 +144,7 @@ fn by_tool(beads: &[(&Move, f64)], frame: &Frame, cells: &Cells, count: usize) -
     of
 }
 
-/// The grid around all beads.
+/// Returns the grid around all beads.
 fn frame(beads: &[(&Move, f64)], cells: &Cells) -> Result<Frame, Error> {
     let [low, high] = bounds(beads.iter().flat_map(|(one, height)| {
         let half = 0.5 * one.area(cells.filament) / height;
@@ -155,14 +154,14 @@ fn frame(beads: &[(&Move, f64)], cells: &Cells) -> Result<Frame, Error> {
     Frame::around(low, high, cells.size)
 }
 
-/// The pieces of a bead: their middles, volumes and times.
+/// Visits the pieces of a bead: centres, volumes and times.
 fn pieces(one: &Move, height: f64, cells: &Cells, mut visit: impl FnMut([f64; 3], f64, f64)) {
     let along = [0, 1, 2].map(|d| one.to[d] - one.from[d]);
     let across = along[0].hypot(along[1]);
     let normal = [-along[1] / across, along[0] / across];
     let width = one.area(cells.filament) / height;
     let side = cells.size[0].min(cells.size[1]) / PIECES;
-    // whole numbers to a billionth are whole
+    // tolerance of a billionth for whole numbers
     let count = |length: f64, piece: f64| (length / piece - 1e-9).ceil();
     let lengthwise = count(across, side).max(1.0);
     let crosswise = count(width, side).clamp(FEW, MANY);
@@ -197,8 +196,8 @@ mod tests {
         parse(Path::new("a.gcode"), text.as_bytes()).unwrap()
     }
 
-    /// Twenty lines of 10 mm, 0.5 mm apart and 0.25 mm high, whose filament fills 0.8 of that, in two layers:
-    /// every cell is filled to 0.8, in the order of the lines.
+    /// Cells of two layers of twenty lines of 10 mm, 0.5 mm apart and 0.25 mm high, with filament for 0.8 of
+    /// that, are all filled to 0.8, in the order of the lines.
     #[test]
     fn lines_fill_their_cells() {
         let fed = 0.8 * 10.0 * 0.5 * 0.25 / (0.25 * PI * 1.75f64.powi(2));
@@ -220,7 +219,7 @@ mod tests {
         assert!((found.ratio - 1.25).abs() < 1e-9 && found.left_out.abs() < 1e-9);
         let whole: f64 = found.fill.iter().sum::<f64>() * 5e-4 * 5e-4 * 2.5e-4;
         assert!((whole / found.volume - 1.0).abs() < 1e-12);
-        // halves of cells: 0.25 mm into each at 10 mm/s
+        // half cells: 0.25 mm into each at 10 mm/s
         for (element, time) in times.iter().enumerate() {
             let (column, line) = (element % 20, element / 20);
             let start = path.printing().nth(line).unwrap().start;
@@ -236,7 +235,7 @@ mod tests {
         );
     }
 
-    /// A slanted line and an arc keep their volume, with thin cells left out too.
+    /// A slanted line and an arc keep their volume, also without thin cells.
     #[test]
     fn volume_is_kept() {
         let path = parsed("M83\nG1 F600 Z0.2\nG1 X7 Y3 E0.3\nG3 X0 Y10 R5 E0.9\n");
@@ -248,8 +247,8 @@ mod tests {
         }
     }
 
-    /// Files of slicers in cells: as counted by reference/print/gcode.py, its grid around both ends of all
-    /// moves, with the purge line at 0.3 mm down to the bed.
+    /// Cells of slicer files agree with reference/print/gcode.py, whose grid encloses both ends of all moves,
+    /// with the purge line at 0.3 mm down to the bed.
     #[test]
     fn files_in_cells() {
         let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures");

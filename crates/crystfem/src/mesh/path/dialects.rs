@@ -1,4 +1,4 @@
-//! Files as slicers write them for several firmwares, in snippets of our own.
+//! Tests of G-code dialects of slicers and firmwares, in own snippets.
 
 use super::*;
 use std::f64::consts::PI;
@@ -7,7 +7,7 @@ fn parsed(text: &str) -> ToolPath {
     parse(Path::new("a.gcode"), text.as_bytes()).unwrap()
 }
 
-/// Millimetres of filament for 0.1 mm² over 10 mm.
+/// Length of filament for 0.1 mm² over 10 mm, mm.
 fn line() -> f64 {
     0.1 * 10.0 / (0.25 * PI * 1.75f64.powi(2))
 }
@@ -59,16 +59,16 @@ fn beads_lie_on_what_is_below() {
         "M83\n; FEATURE: Custom\nG1 X0 Y20 Z0.28 F600\nG1 X10 E{e}\n; CHANGE_LAYER\n; Z_HEIGHT: 0.2\n; LAYER_HEIGHT: 0.2\n; FEATURE: Outer wall\n\
          G1 X0 Y0 Z0.2\nG1 X10 E{e}\n; CHANGE_LAYER\n; Z_HEIGHT: 0.36\n; LAYER_HEIGHT: 0.16\nG1 Z0.36\nG1 X0 E{e}\n"
     );
-    // a support with a layer of its own between, and a first layer that crosses a purge line
+    // a support with its own intermediate layer, and a first layer that crosses a purge line
     let klipper = format!(
         "M83\nG1 F600 X0 Y5 Z.2\nG1 X10 E{e}\nG0 X5 Y0 Z.3\nG1 Y10 E{e}\nG0 X0 Y20 Z.15\nG1 X10 E{e}\nG0 X0 Y20 Z.3\nG1 X10 E{e}\n\
          G0 X0 Y30 Z.3\nG1 X10 E{e}\nG0 X0 Y30 Z.5\nG1 X10 E{e}\n"
     );
-    // the second layer hangs over the bed beside what it lies on; sparse lines cross lines
+    // the second layer overhangs the bed beside its support; sparse lines cross lines
     let over = format!(
         "M83\nG1 F600 X0 Y0 Z.2\nG1 X10 E{e}\nG0 X0 Y0 Z.4\nG1 X10 E{e}\nG0 X0 Y3\nG1 X10 E{e}\nG0 X0 Y0 Z.6\nG1 X10 E{e}\nG0 X5 Y-5\nG1 Y5 E{e}\n"
     );
-    // two objects, one after the other
+    // two objects, printed one after the other
     let sequential = format!(
         "M83\nG1 F600 X0 Y0 Z.2\nG1 X10 E{e}\nG0 X0 Y0 Z.4\nG1 X10 E{e}\nG0 X0 Y50 Z.3\nG1 X10 E{e}\nG0 X0 Y50 Z.5\nG1 X10 E{e}\n"
     );
@@ -92,7 +92,7 @@ fn beads_lie_on_what_is_below() {
     assert_eq!(parsed(&prusa).heights(1.75e-3, Some(1e-4)), [1e-4; 5]);
 }
 
-/// A square of 10 mm: a flat ring, then five turns that rise by 0.2 mm each.
+/// A square of 10 mm: a flat ring, then five turns that each rise by 0.2 mm.
 #[test]
 fn vases_rise_by_a_turn() {
     let e = line();
@@ -105,12 +105,12 @@ fn vases_rise_by_a_turn() {
     }
     let heights = parsed(&text).heights(1.75e-3, None);
     assert!(heights[..4].iter().all(|height| (1e3 * height - 0.2).abs() < 1e-9), "{heights:?}");
-    // the first turn begins as a wedge on what is flat
+    // the first turn begins as a wedge on the flat ring
     assert!(heights[4..8].iter().all(|height| (1e3 * height - 0.2).abs() < 0.02), "{heights:?}");
     assert!(heights[8..].iter().all(|height| (1e3 * height - 0.2).abs() < 2e-3), "{heights:?}");
 }
 
-/// The nozzle's temperatures, and the fan.
+/// Nozzle temperatures and fan speeds.
 #[test]
 fn tools_and_fans() {
     let settings = |text: &str, of: Setting| -> Vec<f64> {
@@ -175,7 +175,7 @@ fn tools_and_fans() {
     assert_eq!(tools.tools(), [0, 1]);
 }
 
-/// What is left out by a name, in marks of printing moves that stay.
+/// Features are removed by name, with the number of printing moves removed.
 #[test]
 fn features_have_one_name() {
     let file = |features: &[&str]| {
@@ -217,7 +217,7 @@ fn features_have_one_name() {
     assert!((shares.iter().map(|share| share.1).sum::<f64>() - 1.0).abs() < 1e-12);
 }
 
-/// Volumes of what is extruded, mm³.
+/// Volumes of extrusion, mm³.
 #[test]
 fn extrusion_by_volume() {
     for (dialect, text, volume) in [
@@ -247,7 +247,7 @@ fn extrusion_by_volume() {
     }
 }
 
-/// What is no text of G-code is refused by its kind; what no firmware moves by is skipped.
+/// Files other than G-code text are refused by kind; unknown commands are skipped.
 #[test]
 fn files_of_other_kinds() {
     let refused = |bytes: &[u8]| parse(Path::new("a.gcode"), bytes).unwrap_err().to_string();
@@ -279,7 +279,8 @@ fn files_of_other_kinds() {
     assert!(count == 2 && line == 2 && (share - 0.2).abs() < 1e-12 && loose.printing().count() == 1);
 }
 
-/// Times by limits that the file states, against closed forms: from rest to rest with jerk and acceleration.
+/// Times with limits stated in the file agree with closed forms: from rest to rest with jerk and
+/// acceleration.
 #[test]
 fn limits_of_the_file() {
     let time = |text: &str| parsed(text).as_stated().duration();
@@ -326,27 +327,27 @@ fn limits_of_the_file() {
         assert!((found - end).abs() < 1e-9, "{dialect}: {found} {end}");
     }
     assert_eq!(parsed(one).describe_limits(), None);
-    // a corner of 90° at jerk speed: as two moves that each end at 10 mm/s, but for the last
+    // a corner of 90° at jerk speed: two moves that each end at 10 mm/s, except the last
     let corner = time("M204 S500\nM205 X10 Y10\nG1 X100 F3000\nG1 Y100\n");
     let halves = with_jerk(100.0, 50.0, 500.0, 10.0)
         + ends_at_rest(with_jerk(100.0, 50.0, 500.0, 10.0), 50.0, 500.0, 10.0);
     assert!((corner - halves).abs() < 1e-9, "{corner} {halves}");
-    // a retraction between stops the nozzle, and takes its own time
+    // a retraction between moves stops the nozzle, and takes time itself
     let through = time("M83\nM204 S500 T500\nM205 X10 E10\nG1 X50 F3000\nG1 X100\n");
     let stopped = time("M83\nM204 S500 T500\nM205 X10 E10\nG1 X50 F3000\nG1 E-1 F3000\nG1 X100 F3000\n");
     assert!(stopped > through + 0.1, "{through} {stopped}");
-    // commands move with the moves
+    // commands shift with the moves
     let path = parsed("M204 S500\nG1 X100 F3000\nG4 S3\nM104 S200\nG1 X0\n").as_stated();
     assert!((path.commands[0].time - path.moves[1].start).abs() < 1e-9);
 }
 
-/// What a ramp from v down to rest takes more than one down to j.
+/// Extra time of a ramp from v to rest over one to j.
 fn ends_at_rest(time: f64, v: f64, a: f64, j: f64) -> f64 {
     time + (v * v - (v - j).powi(2)) / (2.0 * a * v)
 }
 
-/// A square of one wall as PrusaSlicer writes it for a MINI: fifteen layers with retractions, wipes and
-/// lifts, which it estimates at 67 s.
+/// A square of one wall as written by PrusaSlicer for a MINI: fifteen layers with retractions, wipes and
+/// lifts; estimated at 67 s.
 #[test]
 fn time_of_prusa_slicer() {
     let mut text = "M201 X1250 Y1250 Z400 E5000\nM203 X180 Y180 Z12 E80\nM204 P1250 R1250 T1250\nM205 X8 Y8 Z2 E10\nM83\n\

@@ -1,33 +1,34 @@
-//! Heights of beads: what a comment tells, or down to what lies below.
+//! Bead heights: from comments, or down to the material below.
 
 use super::{Move, ToolPath};
 use polycore::numerics::bounds;
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-/// Cells of the map along each axis at most.
+/// Largest number of cells of the map along each axis.
 const CELLS: f64 = 1500.0;
-/// Cell of the map, and levels that are one, over the root of a bead's cross-section.
+/// Cell size of the map over the square root of a bead's cross-section.
 const CELL: f64 = 0.35;
+/// Distance of equal levels over the square root of a bead's cross-section.
 const SAME: f64 = 0.05;
-/// Levels closer than this are one, whatever the cross-section, m.
+/// Smallest distance of different levels, for any cross-section, m.
 const LEAST: f64 = 1e-6;
-/// Tops that a cell remembers.
+/// Number of tops stored a cell.
 const TOPS: usize = 3;
-/// Part of a bead's half width that counts as below another's middle line: neighbours that touch do not.
+/// Fraction of a bead's half width that counts as below another's centreline; touching neighbours do not.
 const CORE: f64 = 0.9;
-/// A bead lies on what is highest under so much of its length.
+/// Fraction of a bead's length that must rest on the highest material below it.
 const SHARE: f64 = 0.03;
-/// A bead higher than its level must not be narrower than this over the middle width there.
+/// Smallest width over the median width of the level, for beads higher than their level.
 const NARROW: f64 = 0.75;
-/// Where z rises, a bead keeps its own height if its width is the middle one to this.
+/// Tolerance of the width over the median, within which a bead on rising z keeps its height.
 const EVEN: f64 = 0.1;
-/// A gap of so many diameters of a strand is filled where nothing else is known.
+/// Largest gap, in strand diameters, that is filled if nothing else is known.
 const NEAR: f64 = 2.0;
-/// Groups below this are runs of moves along which z changes.
+/// Group numbers below this are runs of moves with changing z.
 const RISING: i64 = i64::MIN / 2;
 
-/// Highest tops so far over the bed, falling, by cells in x and y.
+/// Highest tops so far over the bed, descending, by cells in x and y.
 struct Map {
     low: [f64; 2],
     size: f64,
@@ -35,16 +36,16 @@ struct Map {
     tops: Vec<[f64; TOPS]>,
 }
 
-/// What is under a place.
+/// Material below a position.
 enum Below {
     Bead(f64),
     Bed,
-    /// Too many tops above it.
+    /// Unknown, because of too many tops above.
     Unknown,
 }
 
 impl Map {
-    /// Around printing moves whose cross-sections have this mean root, m.
+    /// Builds the map around printing moves whose cross-sections have this mean square root, m.
     fn new(path: &ToolPath, root: f64) -> Self {
         let [low, high] = bounds(path.printing().flat_map(|one| [one.from, one.to]).map(|[x, y, _]| [x, y]));
         let extent = [0, 1].map(|d| (high[d] - low[d]).max(0.0));
@@ -53,7 +54,7 @@ impl Map {
         Self { low, size, count, tops: vec![[f64::NEG_INFINITY; TOPS]; count[0] * count[1]] }
     }
 
-    /// Those outside are moved to the border.
+    /// Index of a cell, clamped to the map.
     fn cell(&self, at: [f64; 2]) -> usize {
         // a cast saturates
         let [i, j] = [0, 1].map(|d| (((at[d] - self.low[d]) / self.size) as usize).min(self.count[d] - 1));
@@ -85,7 +86,7 @@ impl Map {
         }
     }
 
-    /// Places along a move, and z there.
+    /// Sample positions along a move, and z there.
     fn along(&self, one: &Move) -> impl Iterator<Item = ([f64; 2], f64)> + use<> {
         let one = *one;
         let across = (one.to[0] - one.from[0]).hypot(one.to[1] - one.from[1]);
@@ -97,7 +98,7 @@ impl Map {
         })
     }
 
-    /// Marks the core of a bead of some width.
+    /// Marks the core of a bead of a given width.
     fn mark(&mut self, one: &Move, width: f64, same: f64) {
         let along = [one.to[0] - one.from[0], one.to[1] - one.from[1]];
         let across = along[0].hypot(along[1]);
@@ -117,7 +118,7 @@ impl Map {
 /// A bead before its level is known.
 struct Found {
     group: i64,
-    /// Down to what lies below.
+    /// Distance down to the material below.
     gap: f64,
     area: f64,
     length: f64,
@@ -125,7 +126,7 @@ struct Found {
 }
 
 impl Found {
-    /// Diameter of a strand in the air: no bead is higher.
+    /// Diameter of a free strand, an upper bound on bead height.
     fn strand(&self) -> f64 {
         (4.0 * self.area / PI).sqrt()
     }
@@ -136,10 +137,10 @@ impl Found {
 }
 
 impl ToolPath {
-    /// Height of each printing move's bead, m, `height` of all where it is given. Otherwise what the file
-    /// tells; otherwise down to the highest earlier bead below it, or to the bed. A bead over air, which
-    /// cannot be as high as the gap, has the height of others at its level, or down to the next level; in a
-    /// vase the rise of a turn. `filament`: its diameter, m.
+    /// Bead height of each printing move, m: `height` if given, otherwise as stated in the file, otherwise
+    /// down to the highest earlier bead below, or to the bed. A bead over air, with a gap larger than a
+    /// strand, takes the height of others at its level, or reaches down to the next level; in a vase the rise
+    /// of a turn. `filament` is the diameter, m.
     pub(super) fn heights(&self, filament: f64, height: Option<f64>) -> Vec<f64> {
         if let Some(height) = height {
             return vec![height; self.printing().count()];
@@ -159,7 +160,7 @@ impl ToolPath {
                 return one.height;
             }
             let Some(&(usual, width)) = levels.get(&found.group) else {
-                // none at this level fits
+                // no bead at this level fits
                 let step = one.to[2] - below(one.to[2]);
                 let own = if found.group < RISING { found.strand() } else { step };
                 let near = found.gap <= NEAR * found.strand();
@@ -169,7 +170,7 @@ impl ToolPath {
             if found.gap <= 0.0 {
                 found.gap
             } else if found.group < RISING {
-                // the first turn of a vase is a wedge, on what is flat
+                // the first turn of a vase is a wedge on a flat layer
                 if (own / width - 1.0).abs() <= EVEN { found.gap } else { usual }
             } else if found.gap <= 1.01 * usual || (found.fits() && own >= NARROW * width) {
                 found.gap
@@ -180,8 +181,7 @@ impl ToolPath {
         self.printing().zip(&found).map(height).collect()
     }
 
-    /// The same path with the heights of its beads, as a mesh of it has them: they stay when what is below is
-    /// left out.
+    /// Stores the bead heights in the moves, as used for cells, so that they stay if lower moves are removed.
     pub fn with_heights(mut self, filament: f64, height: Option<f64>) -> Self {
         let heights = self.heights(filament, height);
         for (one, height) in self.moves.iter_mut().filter(|one| one.prints).zip(heights) {
@@ -225,7 +225,7 @@ impl ToolPath {
 }
 
 impl Map {
-    /// From a bead down to what lies below it.
+    /// Distance from a bead down to the material below it.
     fn gap(&self, one: &Move, same: f64, strand: f64) -> f64 {
         let (mut gaps, mut on_bed) = (Vec::new(), Vec::new());
         for (at, z) in self.along(one) {
@@ -247,7 +247,7 @@ impl Map {
     }
 }
 
-/// The mean, without rounding where all are equal.
+/// Mean, exact for equal values.
 fn mean_of_equal(all: &[f64]) -> f64 {
     match all.iter().all(|one| *one == all[0]) {
         true => all[0],
@@ -255,7 +255,7 @@ fn mean_of_equal(all: &[f64]) -> f64 {
     }
 }
 
-/// Height and width at the middle of the length of the beads of each level that lie on something.
+/// Height and width, at the median of length, of the supported beads of each level.
 fn levels(found: &[Found]) -> BTreeMap<i64, (f64, f64)> {
     let mut groups: BTreeMap<i64, Vec<&Found>> = BTreeMap::new();
     for one in found.iter().filter(|one| one.fits()) {

@@ -3,30 +3,30 @@
 /// A command: `G1 X10`, or by name (`START_PRINT BED=60`).
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Command<'a> {
-    /// A letter and a number, and the words after it.
+    /// Letter, number, and the words after them.
     Code(char, f64, Words),
-    /// Words alone: the last move again.
+    /// Words alone, which repeat the last move.
     Again(Words),
-    /// Anything else: its first word, and what follows.
+    /// Any other command: its first word, and the rest.
     Named(&'a str, &'a str),
 }
 
-/// Letters and their numbers.
+/// Letters with their numbers.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Words {
     all: Vec<(char, f64)>,
-    /// What is no word, and ends them.
+    /// First invalid text, which ends the words.
     pub wrong: Option<String>,
 }
 
 impl Words {
-    /// The number of a letter; of several the last.
+    /// Number of a letter; the last if repeated.
     pub fn value(&self, letter: char) -> Option<f64> {
         self.all.iter().rev().find(|word| word.0 == letter).map(|word| word.1)
     }
 }
 
-/// A line without its comments in parentheses, its checksum and its comment, and the comment after `;`.
+/// Splits off the comment after `;`, and removes comments in parentheses and the checksum.
 pub(super) fn split(text: &str) -> (String, Option<&str>) {
     let mut depth = 0;
     let mut code = String::new();
@@ -44,7 +44,7 @@ pub(super) fn split(text: &str) -> (String, Option<&str>) {
     (code, comment)
 }
 
-/// The commands of a line without comments: one, or several that begin with G or M after a G.
+/// Splits a line without comments into commands: one, or several that begin with G or M after a G.
 pub(super) fn commands(code: &str) -> Vec<Command<'_>> {
     let code = without_number(code.trim());
     let Some(first) = code.chars().next().filter(|first| *first != '%') else { return Vec::new() };
@@ -63,7 +63,7 @@ pub(super) fn commands(code: &str) -> Vec<Command<'_>> {
     let mut all: Vec<Command> = Vec::new();
     for (letter, number) in words.all {
         match all.last_mut() {
-            // a parameter M or G exists of no G code
+            // no G code has a parameter M or G
             Some(Command::Code('G', _, own)) if !"GM".contains(letter) => own.all.push((letter, number)),
             Some(Command::Code(of, _, own)) if *of != 'G' => own.all.push((letter, number)),
             _ => all.push(Command::Code(letter, number, Words::default())),
@@ -71,20 +71,20 @@ pub(super) fn commands(code: &str) -> Vec<Command<'_>> {
     }
     match all.last_mut() {
         Some(Command::Code(_, _, own)) => own.wrong = words.wrong,
-        // the number itself is none
+        // the number itself is invalid
         _ => return vec![Command::Again(Words { all: Vec::new(), wrong: words.wrong })],
     }
     all
 }
 
-/// Without a line number `N10`.
+/// Removes a line number `N10`.
 fn without_number(code: &str) -> &str {
     let Some(rest) = code.strip_prefix(['N', 'n']) else { return code };
     let digits = rest.trim_start().trim_start_matches(|c: char| c.is_ascii_digit());
     if digits.len() < rest.trim_start().len() { digits.trim_start() } else { code }
 }
 
-/// Letters and their numbers, spaced or not; 0 for a letter alone (`G28 X`).
+/// Parses letters with their numbers, with or without spaces; 0 for a letter alone (`G28 X`).
 fn words(text: &str) -> Words {
     let mut words = Words::default();
     let mut rest = text;
@@ -106,7 +106,7 @@ fn words(text: &str) -> Words {
     words
 }
 
-/// `KEY=VALUE` words of a macro, keys in capitals.
+/// Parses `KEY=VALUE` words of a macro, with keys in upper case.
 pub(super) fn keys(rest: &str) -> impl Iterator<Item = (String, &str)> {
     rest.split_whitespace()
         .filter_map(|word| word.split_once('='))

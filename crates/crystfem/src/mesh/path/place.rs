@@ -1,28 +1,28 @@
-//! Where a path lies: the box around it, where it is put, and how much of it misses the part.
+//! Position of a path: bounding box, placement, and the fraction outside a part.
 
 use super::{Bead, Move, ToolPath};
 use crate::mesh::{Mesh, box_around};
 
-/// Places along a path at which it is looked up at most.
+/// Largest number of samples along a path.
 const SAMPLES: f64 = 1e5;
-/// Cells of the grid over elements along each axis, at most.
+/// Largest number of cells of the grid over elements along each axis.
 const CELLS: f64 = 256.0;
 
 impl ToolPath {
-    /// Moves that lay material down.
+    /// Moves that deposit material.
     pub fn printing(&self) -> impl Iterator<Item = &Move> {
         self.moves.iter().filter(|one| one.prints)
     }
 
-    /// The box around the middle lines of what is laid down, m: z from the bed side of the lowest bead to the
-    /// highest nozzle. `None` of a path that prints nothing.
+    /// Bounding box of the centrelines of beads, m: z from the lower face of the lowest bead to the highest
+    /// nozzle. `None` without printing moves.
     pub fn bounds(&self, bead: Bead) -> Option<[[f64; 3]; 2]> {
         let [mut low, high] = box_around(self.printing().flat_map(|one| [one.from, one.to]))?;
         low[2] -= bead.height;
         Some([low, high])
     }
 
-    /// The same path elsewhere: printers count from a corner of their bed.
+    /// Translates the path; printers measure from a corner of their bed.
     pub fn shifted(mut self, by: [f64; 3]) -> Self {
         for one in &mut self.moves {
             for d in 0..3 {
@@ -33,7 +33,7 @@ impl ToolPath {
         self
     }
 
-    /// The path with the middle of its box over that of some elements, in x and y.
+    /// Translates the path in x and y to centre its bounding box over some elements.
     pub fn centred(self, mesh: &Mesh, elements: &[u32], bead: Bead) -> Self {
         let (Some([low, high]), Some([lower, upper])) = (self.bounds(bead), mesh.bounds_of(elements)) else {
             return self;
@@ -42,8 +42,8 @@ impl ToolPath {
         self.shifted([shift(0), shift(1), 0.0])
     }
 
-    /// The share of what is laid down, by length, whose middle line lies in none of some elements: half a
-    /// bead below the nozzle, looked up every half width, or less often along a very long path.
+    /// Fraction of the deposited length with its centreline outside some elements: half a bead below the
+    /// nozzle, sampled every half width, or less often along a very long path.
     pub fn outside(&self, mesh: &Mesh, elements: &[u32], bead: Bead) -> f64 {
         let length = |one: &Move| (0..3).map(|d| (one.to[d] - one.from[d]).powi(2)).sum::<f64>().sqrt();
         let whole: f64 = self.printing().map(length).sum();
@@ -92,7 +92,7 @@ impl Boxes {
         boxes
     }
 
-    /// Column or row of a coordinate, those outside moved to the border.
+    /// Column or row of a coordinate, clamped to the grid.
     fn index(&self, x: f64, d: usize) -> usize {
         // a cast saturates, so nothing below zero remains
         (((x - self.low[d]) / self.size[d]) as usize).min(self.count[d] - 1)

@@ -1,16 +1,17 @@
-//! What a file prints, in lines for who wrote it.
+//! Summary of a printed file for its author.
 
 use super::ToolPath;
 use polycore::numerics::bounds;
 
-/// A printing move that falls by more than this, and more steeply, lays nothing on anything, m.
+/// Drop of a printing move, m, above which it may print into the air.
 const FALL: f64 = 1e-3;
+/// Slope of such a drop.
 const STEEP: f64 = 0.2;
-/// Features that are listed.
+/// Largest number of listed features.
 const LISTED: usize = 12;
 
 impl ToolPath {
-    /// Tools that lay something, ascending.
+    /// Tools that print, ascending.
     pub fn tools(&self) -> Vec<u16> {
         let mut tools: Vec<u16> = self.printing().map(|one| one.tool).collect();
         tools.sort_unstable();
@@ -18,8 +19,9 @@ impl ToolPath {
         tools
     }
 
-    /// The same path without what has no room above the bed (z ≤ 0) or falls through the air, as the purges
-    /// of some printers do: how many moves, the line of the first, and the share of the filament.
+    /// Turns beads without room above the bed (z ≤ 0) or falling through the air, as in purges of some
+    /// printers, into travel moves. Returns their number, the line of the first, and their fraction of the
+    /// filament.
     pub fn without_loose(&mut self) -> Option<(usize, u32, f64)> {
         let whole = self.fed();
         let (mut count, mut line, mut fed) = (0, 0, 0.0);
@@ -36,8 +38,8 @@ impl ToolPath {
         (count > 0).then(|| (count, line, fed / whole))
     }
 
-    /// Layers, box, filament, volume and time of what is printed, and the share of each feature in its
-    /// volume. `filament`: its diameter, m.
+    /// Layers, bounding box, filament, volume and time of the print, and the volume fraction of each feature.
+    /// `filament` is the diameter, m.
     pub fn summary(&self, filament: f64) -> Vec<String> {
         let ends = || self.printing().flat_map(|one| [one.from, one.to]);
         let [low, high] = bounds(ends());
@@ -74,8 +76,8 @@ impl ToolPath {
         lines
     }
 
-    /// How the duration compares with the slicer's estimate, where the file has one; what it was computed
-    /// with. An estimate that differs by more than a twentieth says what to do.
+    /// Compares the duration, computed as described by `with`, with the slicer's estimate, if present. An
+    /// estimate that differs by more than a twentieth comes with advice.
     pub fn compared(&self, with: &str) -> Option<String> {
         let estimate = self.estimate?;
         let start = self.moves.get(self.first).map_or(0.0, |one| one.start);
@@ -92,7 +94,7 @@ impl ToolPath {
     }
 }
 
-/// A duration to read: `1 h 2 min 3.5 s`.
+/// Formats a duration: `1 h 2 min 3.5 s`.
 pub(super) fn clock(seconds: f64) -> String {
     let (hours, minutes) = ((seconds / 3600.0).floor(), (seconds % 3600.0 / 60.0).floor());
     let rest = (10.0 * (seconds - 3600.0 * hours - 60.0 * minutes)).round() / 10.0;

@@ -10,8 +10,8 @@ fn refused(text: &str, words: &[&str]) {
     assert!(words.iter().all(|word| error.contains(word)), "{error}");
 }
 
-/// A plate of 20 × 10 × 2 elements of 0.5 mm, 0.2 mm high, and lines along x at the rows' middles, there and
-/// back, 10 mm/s.
+/// Returns a plate of 20 × 10 × 2 elements of 0.5 mm, 0.2 mm high, and alternating lines along x at the
+/// centres of the rows, 10 mm/s.
 fn plate() -> (Mesh, ToolPath) {
     let mesh = Grid::uniform([0.0; 3], [0.01, 0.005, 4e-4], [20, 10, 2]).unwrap().mesh("plate").unwrap();
     let mut text = "G21\nG90\nM83\nG0 X0 Y0.25 Z0.2 F600\n".to_owned();
@@ -56,7 +56,7 @@ fn elements_appear_as_the_nozzle_passes() {
 
 #[test]
 fn every_centre_is_found_that_a_search_of_all_finds() {
-    // slanted, rising, standing and far moves, beside a double loop over moves and elements
+    // slanted, rising, standing and distant moves against a double loop over moves and elements
     let mesh = Grid::uniform([0.0; 3], [0.01, 0.007, 0.002], [23, 17, 5]).unwrap().mesh("plate").unwrap();
     let line = |from: [f64; 3], to: [f64; 3], start: f64| Move {
         from,
@@ -222,7 +222,8 @@ fn a_table_of_moves() {
     std::fs::remove_dir_all(&folder).unwrap();
 }
 
-/// Two lines of 10 mm along x over a brick that one of them misses by half of its length, the other wholly.
+/// A path of two lines of 10 mm along x over a brick: one misses it by half of its length, the other
+/// entirely.
 #[test]
 fn where_a_path_lies() {
     let (mesh, _) = plate();
@@ -250,8 +251,8 @@ fn where_a_path_lies() {
     assert_eq!(ToolPath::default().bounds(bead), None);
 }
 
-/// The arcs of tinyg's test: 270° clockwise and 90° anticlockwise of radius 10, a full circle of 20, a half
-/// one by R; exact lengths, chords within 0.01 mm, and filament along them.
+/// Arcs of tinyg's test, 270° clockwise and 90° anticlockwise of radius 10, a full circle of 20, a half
+/// circle by R, have exact lengths, chords within 0.01 mm, and filament along them.
 #[test]
 fn arcs_have_their_lengths() {
     let path = parsed(
@@ -287,8 +288,8 @@ fn arcs_have_their_lengths() {
     assert!((middle[1] + 0.0254).abs() < 1e-4 && (middle[2] - 0.0127).abs() < 4e-4, "{middle:?}");
 }
 
-/// From rest to rest: L/v + v/a where the velocity is reached, 2√(L/a) where not; through a corner of 90° at
-/// jerk speed.
+/// Times from rest to rest: L/v + v/a if the velocity is reached, otherwise 2√(L/a); through a corner of 90°
+/// at jerk speed.
 #[test]
 fn accelerations_take_their_time() {
     let time = |text: &str| parsed(text).accelerated(0.5, 0.008).unwrap().duration();
@@ -296,20 +297,19 @@ fn accelerations_take_their_time() {
     assert!((time("G1 X2 F6000\n") - 2.0 * (0.002f64 / 0.5).sqrt()).abs() < 1e-12);
     // straight on as one move
     assert!((time("G1 X60 F3000\nG1 X100\n") - 2.1).abs() < 1e-12);
-    // from 50 mm/s down to 8 at the corner: twice (50 + 42)/500 s and what is left at 50 mm/s
+    // from 50 mm/s down to 8 at the corner: twice (50 + 42)/500 s and the remainder at 50 mm/s
     let ramp = (2.5e-3 - 0.64e-4 / 1.0 + 2.5e-3) / (2.0 * 0.5);
     let exact = 2.0 * ((0.05 + 0.042) / 0.5 + (0.1 - ramp) / 0.05);
     let found = time("G1 X100 F3000\nG1 Y100\n");
     assert!((found - exact).abs() < 1e-12, "{found} {exact}");
-    // a wait keeps its time, and the command after it moves with it
+    // a dwell keeps its duration, and the command after it shifts with it
     let path = parsed("G1 X100 F3000\nG4 S3\nM104 S200\nG1 Y100\n").accelerated(0.5, 0.008).unwrap();
     assert!((path.duration() - exact - 3.0).abs() < 1e-12);
     assert!((path.commands[0].time - path.moves[1].start).abs() < 1e-12);
     assert!(parsed("G1 X1 F60\n").accelerated(0.0, 1.0).is_err());
 }
 
-/// cube.gcode of the formulation: the first line's bead is 0.449985 mm wide; widths of a bead from its
-/// filament.
+/// Bead widths follow from filament; cube.gcode of the formulation: the first bead is 0.449985 mm wide.
 #[test]
 fn beads_come_from_filament() {
     let path = parsed("M83\nG1 F600 Z0.25\nG1 X10 E0.4\nG1 Z0.5\nG1 X0 E0.4\nM106 S127.5\nG1 E-1\n");
@@ -321,7 +321,7 @@ fn beads_come_from_filament() {
     assert!(levels.len() == 2 && (levels[1] - 5e-4).abs() < 1e-15);
     assert!(path.heights(1.75e-3, None).iter().all(|height| (height - 2.5e-4).abs() < 1e-15));
     let width = stadium_width(1e-6 * area, 2.5e-4);
-    // its area back: rectangle and circle
+    // the area is recovered: rectangle and circle
     let (h, w) = (2.5e-4, width);
     assert!((h * (w - h) + 0.25 * std::f64::consts::PI * h * h - 1e-6 * area).abs() < 1e-18);
     assert_eq!(path.setting(Setting::Fan), [(path.moves[3].end, 0.5)]);
@@ -329,12 +329,12 @@ fn beads_come_from_filament() {
         parsed("M140 S60\nM190 S60\nG1 X10 F600\nM140 S55\nM140 S50\nG1 X0\nM140 S0\n").setting(Setting::Bed);
     assert_eq!(bed[..2], [(0.0, 333.15), (1.0, 323.15)]);
     assert!(bed.len() == 3 && bed[2].0 == 2.0 && bed[2].1.is_nan());
-    // filament alone is time without a move: 1 mm at 10 mm/s
+    // feeding takes time without a move: 1 mm at 10 mm/s
     assert!((path.rest - 0.1).abs() < 1e-12);
 }
 
-/// Files as slicers write them, with figures of a reader of our own in Python (formulation-print.md, part E):
-/// filament of printing moves, time at F with waits, and with 500 mm/s² and a jerk of 8 mm/s.
+/// Slicer files agree with an own reader in Python (formulation-print.md, part E): filament of printing
+/// moves, time at F with dwells, and with 500 mm/s² and a jerk of 8 mm/s.
 #[test]
 fn files_of_slicers() {
     // Zugstab_small.gcode is a file of PeriLab (BSD-3-Clause, see its head); the others are not ours to copy

@@ -50,7 +50,7 @@ fn inverted_elements_and_slivers_are_named_with_their_place() {
         &mesh,
         &["hexahedron 5 at (7.500000e-1, 2.500000e-1, 7.500000e-1) m", "inverted", "allowed: above 0"],
     );
-    // only one corner pushed through: the Gauss points do not see it
+    // only one corner inverted: Gauss points do not detect it
     let mut mesh = brick();
     mesh.points[0] = [0.26, 0.26, 0.26];
     refused(&mesh, &["hexahedron 0 at", "inverted"]);
@@ -107,7 +107,7 @@ fn sets_that_are_wrong_are_named() {
 
 #[test]
 fn what_should_be_looked_at_is_noted() {
-    // the upper half on nodes of its own: 9 doubled nodes, 2 parts
+    // the upper half with its own nodes: 9 duplicate nodes, 2 parts
     let mut mesh = brick();
     let copies: Vec<[f64; 3]> = mesh.points[9..18].to_vec();
     mesh.points.extend(copies);
