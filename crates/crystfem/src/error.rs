@@ -68,7 +68,8 @@ pub enum Error {
     },
     /// An iteration that did not converge.
     #[error(
-        "{method} did not converge at t = {time} s: error {error} K after {iterations} iterations, wanted {wanted} K"
+        "{method} did not converge at t = {time} s: error {error} K after {iterations} iterations, wanted \
+         {wanted} K"
     )]
     NotConverged {
         /// Name of the method.

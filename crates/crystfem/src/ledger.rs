@@ -56,7 +56,8 @@ impl Record {
         self.stored - self.exchange.total() - self.reaction
     }
 
-    /// |[`Self::missing`]| over all heat moved, stored and exchanged, or over that of a shift by [`NOTHING`], 10 mK, if larger.
+    /// Relative imbalance: |[`Self::missing`]| over all heat moved, stored and exchanged, or over that of a
+    /// shift by [`NOTHING`], 10 mK, if larger.
     pub fn relative(&self) -> f64 {
         let scale = (self.moved + self.exchange.gross() + self.held).max(NOTHING * self.sensitivity);
         if scale > 0.0 { self.missing().abs() / scale } else { 0.0 }

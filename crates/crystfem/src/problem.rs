@@ -141,8 +141,8 @@ impl Problem {
         }
         if self.mesh.is_second_order() && (self.capacity == Capacity::Lumped || !self.births.is_empty()) {
             return mesh_error(
-                "found second-order elements with lumped capacity or births; allowed: `consistent` capacity and no births \
-                 (their row sums are negative at corners); print first-order elements"
+                "found second-order elements with lumped capacity or births; allowed: `consistent` capacity \
+                 and no births (their row sums are negative at corners); print first-order elements"
                     .into(),
             );
         }

@@ -193,7 +193,8 @@ impl Simulation {
             || memory.general.state.len() != system.general.points() * system.general.stride
         {
             return Err(Error::Mesh(format!(
-                "state: found {} temperatures and {} + {} points; allowed: {size} and {} + {} of this problem",
+                "state: found {} temperatures and {} + {} points; allowed: {size} and {} + {} of this \
+                 problem",
                 state.temperature.len(),
                 memory.nodal.state.len() / system.nodal.stride.max(1),
                 memory.general.energy.len(),

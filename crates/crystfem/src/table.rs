@@ -212,10 +212,12 @@ mod tests {
                   0.0\t200.5\t0.05\r\n0.1\t199.5\t0.25\r\n";
         let wide: Vec<u8> =
             "\u{feff}".chars().chain(ta.chars()).map(|c| c as u16).flat_map(u16::to_le_bytes).collect();
-        let mettler = "Curve Values:\n  Index      t       Ts       Value\n             [s]     [°C]     [W/g]\n\
-                       \x20     0      0    200.5        0.05\n      1      6    199.5        0.25\n";
-        let elmer = "PerkinElmer\nTime\tHeat Flow\tSample Temperature\nminutes\tmW/mg\tºC\n0\t0.05\t200.5\n0.1\t0.25\t199.5\n";
-        let sheet = "\u{feff}\"time [s]\";\"temperature [K]\";\"heat_flow [W/kg]\"\n\"0\";\"473,65\";\"50\"\n6;472,65;250\n";
+        let mettler = "Curve Values:\n  Index      t       Ts       Value\n             [s]     [°C]     \
+            [W/g]\n\x20     0      0    200.5        0.05\n      1      6    199.5        0.25\n";
+        let elmer = "PerkinElmer\nTime\tHeat Flow\tSample Temperature\nminutes\tmW/mg\tºC\n0\t0.05\t200.5\n\
+            0.1\t0.25\t199.5\n";
+        let sheet = "\u{feff}\"time [s]\";\"temperature [K]\";\"heat_flow \
+            [W/kg]\"\n\"0\";\"473,65\";\"50\"\n6;472,65;250\n";
         for (name, bytes) in [
             ("netzsch", latin),
             ("ta", wide),

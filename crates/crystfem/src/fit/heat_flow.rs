@@ -121,8 +121,8 @@ impl Peak {
             }
         }
         Err(refuse(format!(
-            "the baseline does not converge within {ITERATIONS} iterations; allowed: a step of the heat flow across the \
-             peak that is small against the peak"
+            "the baseline does not converge within {ITERATIONS} iterations; allowed: a step of the heat \
+             flow across the peak that is small against the peak"
         )))
     }
 
@@ -140,8 +140,8 @@ impl Peak {
             sums.push(sum);
         }
         if !(sum > LEAST_AREA * size && sum.is_finite()) {
-            let allowed = "above 0: a peak of heat given off over its baseline. Crystallization is exothermal; is \
-                           `exothermal` the wrong way round, or is the peak outside the limits?";
+            let allowed = "above 0: a peak of heat given off over its baseline. Crystallization is \
+                exothermal; is `exothermal` the wrong way round, or is the peak outside the limits?";
             return Err(Error::Parameter { name: "enthalpy in J/kg", found: sum, allowed: allowed.into() });
         }
         let mut change = 0.0_f64;

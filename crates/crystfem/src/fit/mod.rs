@@ -93,7 +93,8 @@ fn check(what: &str, degrees: &[f64], parameters: usize) -> Result<(), Error> {
     let within = degrees.iter().filter(|a| (0.01..=0.99).contains(*a)).count();
     if within < parameters {
         return refuse(format!(
-            "{within} measurements of alpha between 0.01 and 0.99; allowed: at least {parameters}, as many as parameters"
+            "{within} measurements of alpha between 0.01 and 0.99; allowed: at least {parameters}, as many \
+             as parameters"
         ));
     }
     let [low, high] = degrees.iter().fold([1.0_f64, 0.0_f64], |[low, high], &a| [low.min(a), high.max(a)]);

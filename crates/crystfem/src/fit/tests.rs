@@ -240,7 +240,8 @@ proptest::proptest! {
             proptest::prop_assert!(fit.rms.is_finite());
         }
         let temperatures: Vec<f64> = times.iter().map(|t| t.abs() % 700.0).collect();
-        let run = Run { times: (0..times.len()).map(|k| k as f64).collect(), temperatures, degrees, history: vec![[0.0, 480.0]] };
+        let times = (0..times.len()).map(|k| k as f64).collect();
+        let run = Run { times, temperatures, degrees, history: vec![[0.0, 480.0]] };
         if let Ok(fit) = nakamura(&[run], &KNOWN) {
             proptest::prop_assert!(fit.rms.is_finite());
         }

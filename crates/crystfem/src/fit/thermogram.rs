@@ -40,7 +40,7 @@ impl Thermogram {
     /// K.
     ///
     /// # Errors
-    /// Those of [`Peak::of`].
+    /// Errors of [`Peak::of`].
     pub fn peak(&self, limits: [f64; 2], baseline: Baseline, melting: f64) -> Result<MeasuredPeak, Error> {
         let peak = Peak::of(&self.times, &self.flows, limits, baseline)?;
         let along = |time: &f64| at(&self.times, &self.temperatures, *time);

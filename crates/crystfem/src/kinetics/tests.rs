@@ -272,7 +272,8 @@ proptest::proptest! {
         if (end - start).abs() > 1e-2 {
             let difference = (at(end + h) - at(end - h)) / (2.0 * h);
             let steepest = 0.1 * most;
-            proptest::prop_assert!((difference - growth.slope).abs() < 1e-3 * steepest, "{} {}", difference, growth.slope);
+            let slope = growth.slope;
+            proptest::prop_assert!((difference - slope).abs() < 1e-3 * steepest, "{difference} {slope}");
         }
     }
 

@@ -1,4 +1,4 @@
-//! One branch of a solidifying Maxwell body over a step, in closed form, with its energies.
+//! A branch of a solidifying Maxwell body over a step, in closed form, with its energies.
 
 /// Input of a branch over a step: s is the fraction of the network that exists (1 for the amorphous phase), b
 /// its softening.

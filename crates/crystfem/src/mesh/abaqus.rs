@@ -164,8 +164,8 @@ impl Reader<'_> {
     fn elements(&mut self, card: &Card, cards: &mut Cards) -> Result<(), Error> {
         let name = card.parameter("TYPE").unwrap_or("").to_uppercase();
         let Some(kind) = kind_of(&name) else {
-            let allowed = "C3D8, C3D4, C3D6, C3D20, C3D10, C3D15, with D before or letters after them or not (DC3D8, C3D20R, \
-                           …); shells, membranes and trusses only name surfaces";
+            let allowed = "C3D8, C3D4, C3D6, C3D20, C3D10, C3D15, with D before or letters after them or \
+                not (DC3D8, C3D20R, …); shells, membranes and trusses only name surfaces";
             return Err(line_error(self.path, card.line, "element type", name, allowed));
         };
         let count = kind.node_count();

@@ -264,7 +264,8 @@ impl Content {
             let first = facets.iter().find(|facet| !face_of.contains_key(&facet.1));
             let label = first.map_or(0, |facet| self.elements[facet.1 as usize].label);
             self.notes.push(format!(
-                "{missed} triangles or quadrangles are not sides of a hexahedron, tetrahedron or wedge, element {label} first: left out"
+                "{missed} triangles or quadrangles are not sides of a hexahedron, tetrahedron or wedge, \
+                 element {label} first: left out"
             ));
         }
         face_of
@@ -282,7 +283,8 @@ impl Content {
             let faces: Vec<Face> = places.iter().filter_map(|place| face_of.get(place).copied()).collect();
             if set.is_empty() && faces.is_empty() {
                 self.notes.push(format!(
-                    "element set `{name}` contains no hexahedra, tetrahedra, wedges or sides of them: left out"
+                    "element set `{name}` contains no hexahedra, tetrahedra, wedges or sides of them: left \
+                     out"
                 ));
             }
             if !faces.is_empty() {

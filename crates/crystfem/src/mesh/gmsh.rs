@@ -73,7 +73,8 @@ pub fn parse(path: &Path, bytes: &[u8], scale: f64) -> Result<ReadMesh, Error> {
     if reader.reduced > 0 {
         let count = reader.reduced;
         let note = format!(
-            "{count} elements of complete second order: nodes in the middles of sides and elements are left out"
+            "{count} elements of complete second order: nodes in the middles of sides and elements are left \
+             out"
         );
         reader.content.notes.push(note);
     }
@@ -341,8 +342,8 @@ fn kind_of(numbers: &Numbers, code: i64) -> Result<Kind, Error> {
     KINDS.iter().find(|kind| kind.0 == code).map(|kind| kind.1).ok_or_else(|| {
         let pyramids = if matches!(code, 7 | 14 | 19) { " (pyramids are none)" } else { "" };
         let allowed = format!(
-            "1, 8 (lines), 2, 9 (triangles), 3, 16, 10 (quadrangles), 4, 11 (tetrahedra), 5, 17, 12 (hexahedra), \
-             6, 18, 13 (prisms), 15 (point){pyramids}; in Gmsh: Mesh.ElementOrder = 1 or 2"
+            "1, 8 (lines), 2, 9 (triangles), 3, 16, 10 (quadrangles), 4, 11 (tetrahedra), 5, 17, 12 \
+             (hexahedra), 6, 18, 13 (prisms), 15 (point){pyramids}; in Gmsh: Mesh.ElementOrder = 1 or 2"
         );
         numbers.error("type of elements", code, allowed)
     })

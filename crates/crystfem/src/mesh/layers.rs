@@ -92,7 +92,8 @@ impl Layers {
             let above = faces.partition_point(|face| *face <= z);
             if above == 0 || above == faces.len() {
                 return Err(Error::Mesh(format!(
-                    "element {element} at ({x:.6e}, {y:.6e}, {z:.6e}) m is in no layer; allowed: z from {} m to {} m",
+                    "element {element} at ({x:.6e}, {y:.6e}, {z:.6e}) m is in no layer; allowed: z from {} \
+                     m to {} m",
                     faces[0],
                     faces[faces.len() - 1]
                 )));

@@ -94,7 +94,8 @@ pub fn check(mesh: &Mesh, labels: Option<&[u64]>) -> Result<Quality, Error> {
     if let Some((count, [a, b])) = doubles(mesh, &surface) {
         let [x, y, z] = mesh.points[a as usize];
         notes.push(format!(
-            "{count} nodes lie on others, nodes {a} and {b} at ({x:.6e}, {y:.6e}, {z:.6e}) m first: not merged"
+            "{count} nodes lie on others, nodes {a} and {b} at ({x:.6e}, {y:.6e}, {z:.6e}) m first: not \
+             merged"
         ));
     }
     if let Some((hexahedron, tetrahedron)) = half_faces(mesh, &surface) {

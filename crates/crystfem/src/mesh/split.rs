@@ -7,7 +7,7 @@ use crate::mesh::{Cell, Face, HEXAHEDRON_SIDES, Mesh, Shape};
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Split {
-    /// One hexahedron.
+    /// A hexahedron.
     #[default]
     Hexahedra,
     /// Five tetrahedra, mirrored from cell to cell so that diagonals meet.

@@ -170,8 +170,8 @@ impl Surface {
             if faces.is_empty() {
                 let count = set.len();
                 return Err(Error::Mesh(format!(
-                    "node set `{name}` ({count} nodes) has all nodes of no face; allowed: one that has, or a temperature, \
-                     which acts on nodes"
+                    "node set `{name}` ({count} nodes) has all nodes of no face; allowed: one that has, or \
+                     a temperature, which acts on nodes"
                 )));
             }
         } else if name == "outer" {
@@ -292,8 +292,8 @@ impl Surface {
                     [a, b] if !self.firsts.is_empty() && all(a.1) != all(b.1) => {
                         let [a, b] = [a.1, b.1].map(|number| self.face(number).element);
                         return Err(Error::Mesh(format!(
-                            "elements {a} and {b} have the corners of one face and different nodes on its edges; \
-                             allowed: elements of one order side by side, with the same nodes"
+                            "elements {a} and {b} have the corners of one face and different nodes on its \
+                             edges; allowed: elements of one order side by side, with the same nodes"
                         )));
                     }
                     [a, b] => {

@@ -139,8 +139,8 @@ impl Task {
         by(
             direct,
             format!(
-                "{name}: about {iterations:.0} iterations a solve, against {solve:.0} for a solve with factors and \
-                 {factor:.0} for its share of a factorization over {:.0} solves",
+                "{name}: about {iterations:.0} iterations a solve, against {solve:.0} for a solve with \
+                 factors and {factor:.0} for its share of a factorization over {:.0} solves",
                 self.solves
             ),
         )

@@ -74,13 +74,14 @@ fn what_is_written_is_read_back() {
     }
 }
 
-const BRICK: &str = "*Heading\nby hand\n** a comment\n*Part, name=P\n*Node, nset=All\n1, 0., 0., 0.\n2, 1.0D0\n3, 1., 1.\n\
-     4, 0, 1\n5, 0,0,1\n6, 1,0,1\n7, 1,1,1\n8, 0,1,1\n\n*ELEMENT, TYPE=dc3d8,\n ELSET=Bricks\n\
-     10, 1, 2, 3, 4,\n 5, 6, 7, 8\n*End Part\n*Assembly\n*Instance, name=I, part=P\n*End Instance\n\
-     *Nset, nset=low, generate\n1, 4\n*nset, NSET=LOW\n5,\n*Nset, nset=odd, generate\n1, 100000000000, 2\n\
-     *Nset, nset=mixed\nlow, 8\n*Nset, nset=of, elset=bricks\n*Elset, elset=again, instance=I\nBRICKS, 10\n\
-     *Surface, type=ELEMENT, name=top\nI.again, S2\n*Surface, name=skin\n10,\n*Surface, name=dots, type=node\nodd\n\
-     *Material, name=PA12\n*Conductivity\n0.25\n*Step\n*Heat transfer\n*End Step\n";
+const BRICK: &str = "*Heading\nby hand\n** a comment\n*Part, name=P\n*Node, nset=All\n1, 0., 0., 0.\n\
+    2, 1.0D0\n3, 1., 1.\n4, 0, 1\n5, 0,0,1\n6, 1,0,1\n7, 1,1,1\n8, 0,1,1\n\n\
+    *ELEMENT, TYPE=dc3d8,\n ELSET=Bricks\n10, 1, 2, 3, 4,\n 5, 6, 7, 8\n*End Part\n*Assembly\n\
+    *Instance, name=I, part=P\n*End Instance\n*Nset, nset=low, generate\n1, 4\n*nset, NSET=LOW\n5,\n\
+    *Nset, nset=odd, generate\n1, 100000000000, 2\n*Nset, nset=mixed\nlow, 8\n*Nset, nset=of, elset=bricks\n\
+    *Elset, elset=again, instance=I\nBRICKS, 10\n*Surface, type=ELEMENT, name=top\nI.again, S2\n\
+    *Surface, name=skin\n10,\n*Surface, name=dots, type=node\nodd\n*Material, name=PA12\n*Conductivity\n\
+    0.25\n*Step\n*Heat transfer\n*End Step\n";
 
 #[test]
 fn all_that_is_understood() {
@@ -101,7 +102,8 @@ fn all_that_is_understood() {
     assert_eq!(
         read.notes,
         [
-            "*CONDUCTIVITY (line 41, `0.25`) is NOT used: the deck has no units; give `conductivity` of [materials.NAME]",
+            "*CONDUCTIVITY (line 41, `0.25`) is NOT used: the deck has no units; give `conductivity` of \
+             [materials.NAME]",
             "*HEAT TRANSFER (line 44) is NOT used: the deck has no units; give [time]",
             "*MATERIAL (line 40, `PA12`) is NOT used: the deck has no units; give [materials.NAME]",
             "keywords not used: *END STEP (1), *STEP (1)",
@@ -173,8 +175,8 @@ fn sets_cannot_multiply_beyond_the_file() {
     refused(&format!("{BRICK}*NSET,NSET=s0\n1\n{doubling}"), &["members of sets"]);
 }
 
-/// One element of each type in the order of nodes and sides of the Abaqus manual (28.1.4, three-dimensional
-/// solids), with mid-edge nodes in that order: a wrong one would fold the element.
+/// Elements of all types, one each, in the order of nodes and sides of the Abaqus manual (28.1.4,
+/// three-dimensional solids), with mid-edge nodes in that order: a wrong one would fold the element.
 #[test]
 fn elements_of_all_types() {
     let places: [[f64; 3]; 8] = [
@@ -259,13 +261,15 @@ fn orders_do_not_mix() {
 /// Lists keywords with an equivalent one by one, with their count and first values.
 #[test]
 fn what_is_not_used_says_what_to_give_instead() {
-    let more = "*Tie, name=glue\na, b\n*Dflux\nBricks, BF, 1.\n*DFLUX, amplitude=RAMP\nagain, BF, 2.\n*initial conditions, type=temperature\nAll, 20.\n\
-                *Node File\nNT\n*NODE FILE\nNT\n";
+    let more = "*Tie, name=glue\na, b\n*Dflux\nBricks, BF, 1.\n*DFLUX, amplitude=RAMP\nagain, BF, 2.\n\
+        *initial conditions, type=temperature\nAll, 20.\n*Node File\nNT\n*NODE FILE\nNT\n";
     let notes = parsed(&format!("{BRICK}{more}")).notes;
     for told in [
         "*TIE (line 46, `glue`) is NOT used: heat passes only between elements that share nodes",
-        "*DFLUX (line 48, `Bricks, BF, 1.`, 2 times) is NOT used: the deck has no units; give `flux` of [[boundary]], or `power`",
-        "*INITIAL CONDITIONS (line 52, `All, 20.`) is NOT used: the deck has no units; give `temperature` of [[region]]",
+        "*DFLUX (line 48, `Bricks, BF, 1.`, 2 times) is NOT used: the deck has no units; give `flux` of \
+         [[boundary]], or `power`",
+        "*INITIAL CONDITIONS (line 52, `All, 20.`) is NOT used: the deck has no units; give `temperature` \
+         of [[region]]",
         "keywords not used: *END STEP (1), *NODE FILE (2), *STEP (1)",
     ] {
         assert!(notes.iter().any(|note| note.starts_with(told)), "{told}: {notes:#?}");
@@ -301,7 +305,8 @@ fn files_are_included() {
     write("sub/rows.inp", "1,1,2,3,4\n");
     write("bad.txt", "1,0,0,0\n\n2,1,x,0\n");
     write("again.inp", "*INCLUDE, INPUT=again.inp\n");
-    let deck = "*NODE, NSET=N\n*INCLUDE, INPUT=nodes.txt\n4,0,0,1\n*Include,\n input=sub\\elements.inp\n*NSET, NSET=low\n1,2,3\n";
+    let deck = "*NODE, NSET=N\n*INCLUDE, INPUT=nodes.txt\n4,0,0,1\n*Include,\n input=sub\\elements.inp\n\
+        *NSET, NSET=low\n1,2,3\n";
     let read_from = |text: &str| {
         write("deck.inp", text);
         read(&at("deck.inp"), 1.0)

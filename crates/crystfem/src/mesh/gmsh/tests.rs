@@ -251,8 +251,9 @@ fn versions_by_hand() {
     let four = |head: &str, physical: &str, parametric: &str, more: &str| {
         let box_of = "0 0 0 1 1 1";
         format!(
-            "{head}$MeshFormat\n4 0 8\n$EndMeshFormat\n{names}$Entities\n0 0 0 1\n7 {box_of} {physical} 0\n$EndEntities\n$Nodes\n1 4\n\
-             7 3 {parametric} 4\n{}$EndNodes\n$Elements\n1 1\n7 3 4 1\n1 1 2 3 4\n$EndElements\n",
+            "{head}$MeshFormat\n4 0 8\n$EndMeshFormat\n{names}$Entities\n0 0 0 1\n7 {box_of} {physical} 0\n\
+             $EndEntities\n$Nodes\n1 4\n7 3 {parametric} 4\n{}$EndNodes\n$Elements\n1 1\n7 3 4 1\n\
+             1 1 2 3 4\n$EndElements\n",
             numbered(more)
         )
     };

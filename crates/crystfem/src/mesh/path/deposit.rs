@@ -114,7 +114,8 @@ impl ToolPath {
         if let Some((one, height)) = beads.iter().find(|(_, height)| !(*height > 0.0 && height.is_finite())) {
             let ([x, y, z], line) = (one.to.map(|x| 1e3 * x), one.line);
             return Err(Error::Mesh(format!(
-                "line {line} of the path, bead to ({x}, {y}, {z}) mm: height {height} m; allowed: above 0, above the bed at z = 0"
+                "line {line} of the path, bead to ({x}, {y}, {z}) mm: height {height} m; allowed: above 0, \
+                 above the bed at z = 0"
             )));
         }
         Ok(beads)

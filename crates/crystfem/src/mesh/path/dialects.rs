@@ -26,7 +26,8 @@ fn extruders_keep_their_mode() {
         ("no M82 or M83, relative", "G91\nG1 F600 X10 E1\nG1 X10 E1\n", 2.0),
         (
             "Klipper, a macro that keeps the state",
-            "M82\nG90\nG1 F600 X10 E1\nSAVE_GCODE_STATE NAME=a\nG91\nM83\nG1 E-1\nRESTORE_GCODE_STATE NAME=a\nG1 X0 E2\n",
+            "M82\nG90\nG1 F600 X10 E1\nSAVE_GCODE_STATE NAME=a\nG91\nM83\nG1 E-1\n\
+             RESTORE_GCODE_STATE NAME=a\nG1 X0 E2\n",
             2.0,
         ),
         ("RepRapFirmware, G92", "M83\nG92 E0\nG1 F600 X10 E1\nG92 E5\nG1 X0 E1\n", 2.0),
@@ -47,30 +48,33 @@ fn extruders_keep_their_mode() {
 fn beads_lie_on_what_is_below() {
     let e = line();
     let prusa = format!(
-        "M83\n;TYPE:Custom\nG1 Z.25 F600\nG1 X10 Y-9 E{e}\n;LAYER_CHANGE\n;Z:0.3\n;HEIGHT:0.3\nG1 Z.3\n;TYPE:Perimeter\n\
-         G1 X0 Y0\nG1 X10 E{e}\n;LAYER_CHANGE\n;Z:0.5\n;HEIGHT:0.2\nG1 Z.5\nG1 X0 E{e}\n;TYPE:Bridge infill\n;HEIGHT:0.4\nG1 Y5\n\
-         G1 X10 E{e}\n;TYPE:Custom\nG0 X0 Y-9 Z.25\nG1 X10 E{e}\n"
+        "M83\n;TYPE:Custom\nG1 Z.25 F600\nG1 X10 Y-9 E{e}\n;LAYER_CHANGE\n;Z:0.3\n;HEIGHT:0.3\nG1 Z.3\n\
+         ;TYPE:Perimeter\nG1 X0 Y0\nG1 X10 E{e}\n;LAYER_CHANGE\n;Z:0.5\n;HEIGHT:0.2\nG1 Z.5\nG1 X0 E{e}\n\
+         ;TYPE:Bridge infill\n;HEIGHT:0.4\nG1 Y5\nG1 X10 E{e}\n;TYPE:Custom\nG0 X0 Y-9 Z.25\nG1 X10 E{e}\n"
     );
     let cura = format!(
-        "M83\nG1 X0.1 Y20 Z0.3 F600\nG1 X10 E{e}\n;LAYER_COUNT:2\n;LAYER:0\n;TYPE:WALL-OUTER\nG0 X0 Y0 Z0.2\nG1 X10 E{e}\n\
-         ;LAYER:1\nG0 X0 Y0 Z0.35\nG1 X10 E{e}\n"
+        "M83\nG1 X0.1 Y20 Z0.3 F600\nG1 X10 E{e}\n;LAYER_COUNT:2\n;LAYER:0\n;TYPE:WALL-OUTER\n\
+         G0 X0 Y0 Z0.2\nG1 X10 E{e}\n;LAYER:1\nG0 X0 Y0 Z0.35\nG1 X10 E{e}\n"
     );
     let bambu = format!(
-        "M83\n; FEATURE: Custom\nG1 X0 Y20 Z0.28 F600\nG1 X10 E{e}\n; CHANGE_LAYER\n; Z_HEIGHT: 0.2\n; LAYER_HEIGHT: 0.2\n; FEATURE: Outer wall\n\
-         G1 X0 Y0 Z0.2\nG1 X10 E{e}\n; CHANGE_LAYER\n; Z_HEIGHT: 0.36\n; LAYER_HEIGHT: 0.16\nG1 Z0.36\nG1 X0 E{e}\n"
+        "M83\n; FEATURE: Custom\nG1 X0 Y20 Z0.28 F600\nG1 X10 E{e}\n; CHANGE_LAYER\n; Z_HEIGHT: 0.2\n\
+         ; LAYER_HEIGHT: 0.2\n; FEATURE: Outer wall\nG1 X0 Y0 Z0.2\nG1 X10 E{e}\n; CHANGE_LAYER\n\
+         ; Z_HEIGHT: 0.36\n; LAYER_HEIGHT: 0.16\nG1 Z0.36\nG1 X0 E{e}\n"
     );
     // a support with its own intermediate layer, and a first layer that crosses a purge line
     let klipper = format!(
-        "M83\nG1 F600 X0 Y5 Z.2\nG1 X10 E{e}\nG0 X5 Y0 Z.3\nG1 Y10 E{e}\nG0 X0 Y20 Z.15\nG1 X10 E{e}\nG0 X0 Y20 Z.3\nG1 X10 E{e}\n\
-         G0 X0 Y30 Z.3\nG1 X10 E{e}\nG0 X0 Y30 Z.5\nG1 X10 E{e}\n"
+        "M83\nG1 F600 X0 Y5 Z.2\nG1 X10 E{e}\nG0 X5 Y0 Z.3\nG1 Y10 E{e}\nG0 X0 Y20 Z.15\nG1 X10 E{e}\n\
+         G0 X0 Y20 Z.3\nG1 X10 E{e}\nG0 X0 Y30 Z.3\nG1 X10 E{e}\nG0 X0 Y30 Z.5\nG1 X10 E{e}\n"
     );
     // the second layer overhangs the bed beside its support; sparse lines cross lines
     let over = format!(
-        "M83\nG1 F600 X0 Y0 Z.2\nG1 X10 E{e}\nG0 X0 Y0 Z.4\nG1 X10 E{e}\nG0 X0 Y3\nG1 X10 E{e}\nG0 X0 Y0 Z.6\nG1 X10 E{e}\nG0 X5 Y-5\nG1 Y5 E{e}\n"
+        "M83\nG1 F600 X0 Y0 Z.2\nG1 X10 E{e}\nG0 X0 Y0 Z.4\nG1 X10 E{e}\nG0 X0 Y3\nG1 X10 E{e}\n\
+         G0 X0 Y0 Z.6\nG1 X10 E{e}\nG0 X5 Y-5\nG1 Y5 E{e}\n"
     );
     // two objects, printed one after the other
     let sequential = format!(
-        "M83\nG1 F600 X0 Y0 Z.2\nG1 X10 E{e}\nG0 X0 Y0 Z.4\nG1 X10 E{e}\nG0 X0 Y50 Z.3\nG1 X10 E{e}\nG0 X0 Y50 Z.5\nG1 X10 E{e}\n"
+        "M83\nG1 F600 X0 Y0 Z.2\nG1 X10 E{e}\nG0 X0 Y0 Z.4\nG1 X10 E{e}\nG0 X0 Y50 Z.3\nG1 X10 E{e}\n\
+         G0 X0 Y50 Z.5\nG1 X10 E{e}\n"
     );
     let thin = format!(
         "M83\nG1 F600 X0 Y9 Z.3\nG1 X10 E{}\nG0 X0 Y0 Z.2\nG1 X10 E{e}\nG0 X0 Y0 Z.4\nG1 X10 E{e}\n",
@@ -149,7 +153,8 @@ fn tools_and_fans() {
         (
             "Klipper, heaters by name",
             format!(
-                "SET_HEATER_TEMPERATURE HEATER=extruder TARGET=220\n{go}SET_HEATER_TEMPERATURE HEATER=extruder1 TARGET=200\n"
+                "SET_HEATER_TEMPERATURE HEATER=extruder TARGET=220\n\
+                 {go}SET_HEATER_TEMPERATURE HEATER=extruder1 TARGET=200\n"
             ),
             vec![220.0],
         ),
@@ -262,7 +267,8 @@ fn files_of_other_kinds() {
     assert!(refused(b"GCDE\x01").contains("export it from the slicer as text"));
     for text in [
         "\u{feff}%\nN1 G21*33\nN2 G1 X10 F600 E1*5\nM117 Hi; there\n%\n",
-        "EXCLUDE_OBJECT_DEFINE NAME=a CENTER=1,2 POLYGON=[[1,2]]\nGET_POSITION\nG29 P1 A?\n/G1 X5\n@pause\ng1x10f600e1\n",
+        "EXCLUDE_OBJECT_DEFINE NAME=a CENTER=1,2 POLYGON=[[1,2]]\nGET_POSITION\nG29 P1 A?\n/G1 X5\n@pause\n\
+         g1x10f600e1\n",
         "(Cura) G1 (to) X10 F600 E1\r\nM84 X Y E\r\nG5\r\n",
         "G1 X10 F600 E1\rM84\rM300\r",
     ] {
@@ -350,14 +356,16 @@ fn ends_at_rest(time: f64, v: f64, a: f64, j: f64) -> f64 {
 /// lifts; estimated at 67 s.
 #[test]
 fn time_of_prusa_slicer() {
-    let mut text = "M201 X1250 Y1250 Z400 E5000\nM203 X180 Y180 Z12 E80\nM204 P1250 R1250 T1250\nM205 X8 Y8 Z2 E10\nM83\n\
-        G1 Y-2 X179 F2400\nG1 Z3 F720\nG1 X170 F1000\nG1 Z0.2 F720\nG1 X110 E8 F900\nG1 X40 E10 F700\nG1 E-3.2 F4200\nG1 Z.4 F10800\n"
+    let mut text = "M201 X1250 Y1250 Z400 E5000\nM203 X180 Y180 Z12 E80\nM204 P1250 R1250 T1250\n\
+        M205 X8 Y8 Z2 E10\nM83\nG1 Y-2 X179 F2400\nG1 Z3 F720\nG1 X170 F1000\nG1 Z0.2 F720\n\
+        G1 X110 E8 F900\nG1 X40 E10 F700\nG1 E-3.2 F4200\nG1 Z.4 F10800\n"
         .to_owned();
     for layer in 1..=15 {
         let (z, low, high) = (0.2 * f64::from(layer), 82.725, 97.275);
         if layer > 1 {
             text += &format!(
-                "G1 E-2.24 F4200\nG1 F8640 X84.7 Y82.777 E-.912\nG1 E-.048 F4200\nG1 Z{z:.1} F10800\nG1 Z{:.1}\n",
+                "G1 E-2.24 F4200\nG1 F8640 X84.7 Y82.777 E-.912\nG1 E-.048 F4200\nG1 Z{z:.1} F10800\n\
+                 G1 Z{:.1}\n",
                 z + 0.2
             );
         }
@@ -370,7 +378,8 @@ fn time_of_prusa_slicer() {
         }
         text += "M204 S1250\n";
     }
-    text += "G1 E-2.24 F4200\nG1 F8640 X84.7 Y82.777 E-.912\nG1 E-.048 F4200\nG1 Z3.2 F10800\nG1 E-1 F2100\nG1 Z5 F720\nG1 X178 Y178 F4200\nG1 Z33 F720\n";
+    text += "G1 E-2.24 F4200\nG1 F8640 X84.7 Y82.777 E-.912\nG1 E-.048 F4200\nG1 Z3.2 F10800\nG1 E-1 F2100\n\
+        G1 Z5 F720\nG1 X178 Y178 F4200\nG1 Z33 F720\n";
     let path = parsed(&text);
     let found = path.clone().as_stated().duration();
     assert!((found / 67.0 - 1.0).abs() < 0.01, "{found}");
@@ -396,6 +405,7 @@ fn estimates_are_compared() {
         "M83\n{go};LAYER_CHANGE\n;TYPE:Perimeter\nG1 X0 E1\n;TYPE:Solid infill\nG1 X10 E3\n"
     ))
     .summary(1.75e-3);
-    assert!(lines[0].starts_with("the file prints 1 marked layer, middle lines from (0, 0, 0) mm to (100, 0, 0) mm, 9.621 mm³ of 4.0 mm"), "{lines:?}");
+    assert!(lines[0].starts_with("the file prints 1 marked layer, middle lines from (0, 0, 0) mm to (100, \
+        0, 0) mm, 9.621 mm³ of 4.0 mm"), "{lines:?}");
     assert_eq!(lines[1], "by feature: `Solid infill` 75.0 %, `Perimeter` 25.0 %");
 }

@@ -430,7 +430,8 @@ impl<'a> Reader<'a> {
                 "relative, as the axes"
             };
             path.notes.push(format!(
-                "{doubtful} moves feed between G91 and G90 without M83, the first in line {line}: E is read as {read} (firmwares differ)"
+                "{doubtful} moves feed between G91 and G90 without M83, the first in line {line}: E is read \
+                 as {read} (firmwares differ)"
             ));
         }
         if self.repeated > 0 {

@@ -141,8 +141,9 @@ fn gaps_can_be_filled() {
 
 #[test]
 fn codes_and_their_forms() {
-    let text = "; a comment\nN10 G21 ; mm*\nM104 S220\nM117 Printing... (1/2)\nG28\nG92 E0\nG1 F1200\nG1X10Y0E1\n\
-                g1 x10 y20 e1.5 (two) f600\nG4 P500\nG91\nG1 Z0.2 F60\nG90\nG92 X0 E0\nG1 X5 E1 F300*71\nG1 E0\nG1 E2\nG20\nG0 X1\n";
+    let text = "; a comment\nN10 G21 ; mm*\nM104 S220\nM117 Printing... (1/2)\nG28\nG92 E0\nG1 F1200\n\
+        G1X10Y0E1\ng1 x10 y20 e1.5 (two) f600\nG4 P500\nG91\nG1 Z0.2 F60\nG90\nG92 X0 E0\nG1 X5 E1 F300*71\n\
+        G1 E0\nG1 E2\nG20\nG0 X1\n";
     let path = parsed(text);
     let places: Vec<[f64; 3]> = path.moves.iter().map(|one| one.to).collect();
     let exact = [

@@ -197,8 +197,9 @@ fn closed(path: &Path, points: &[[f64; 3]], edges: &Edges) -> Result<(), Error> 
     let turned = count(&|a, b| a + b == 2);
     let [p, q] = ends.map(|node| points[node as usize].map(|x| (1e9 * x).round() / 1e6));
     Err(Error::Mesh(format!(
-        "{}: not a closed surface: {open} edges of one triangle, {many} of more than two, {turned} of two that \
-         face opposite ways, the first from {p:?} to {q:?} mm; allowed: 0 (repair it where it was drawn)",
+        "{}: not a closed surface: {open} edges of one triangle, {many} of more than two, {turned} of two \
+         that face opposite ways, the first from {p:?} to {q:?} mm; allowed: 0 (repair it where it was \
+         drawn)",
         path.display()
     )))
 }
