@@ -7,20 +7,20 @@
 //! balance closes for layers of any thickness; for linear materials T* is the mean weighted by heat capacity.
 //! A prescribed temperature stays, and its support exchanges the difference.
 
-use crate::element::{self, Geometry, MOST, WIDE, WIDE_POINTS};
+use crate::element::{self, FIRST_ORDER_NODES, Geometry, MAX_ELEMENT_NODES, MAX_ELEMENT_POINTS};
 use crate::error::Error;
-use crate::material::Point;
+use crate::material::PointInput;
 use crate::simulation::{Simulation, State};
-use crate::system::{Added, Memory, Moves, NONE, Points, System};
+use crate::system::{Added, NONE, PointMemory, PointMoves, PointStates, ThermalSystem};
 use crate::time::Steps;
 use nalgebra::Vector3;
 use std::collections::HashMap;
 
 /// Limit on iterations for a mixing temperature; bisection alone needs about 60.
-const MOST_ITERATIONS: usize = 200;
+const MAX_ITERATIONS: usize = 200;
 
 /// Material at a node that may change its temperature.
-struct Part {
+struct NodeMaterial {
     material: u16,
     /// ρV, kg.
     mass: f64,
@@ -37,7 +37,7 @@ struct Part {
 
 /// Linear material at a node.
 #[derive(Clone, Copy, Default)]
-struct Sum {
+struct LinearSum {
     /// ΣρcV of new elements, J/K.
     capacity: f64,
     /// Σ ρcV T_birth, J.
@@ -91,9 +91,9 @@ impl Simulation {
     /// Initializes the points of the elements that exist at the start, at their temperature.
     pub(crate) fn fresh_points(&mut self) -> Result<(), Error> {
         let (problem, system) = (&self.problem, &self.system);
-        let mut memory = Memory::empty(system);
+        let mut memory = PointMemory::empty(system);
         for node in 0..system.size() {
-            for point in system.nodal.of(node) {
+            for point in system.nodal.points_of(node) {
                 let material = usize::from(system.nodal.material[point]);
                 memory.nodal.fresh(
                     problem,
@@ -109,7 +109,7 @@ impl Simulation {
             let first = general.starts[index] as usize;
             let equations = general.equations_of(index);
             let nodes = equations.len();
-            let shapes = element::shapes::<WIDE, WIDE_POINTS>(nodes);
+            let shapes = element::shapes::<MAX_ELEMENT_NODES, MAX_ELEMENT_POINTS>(nodes);
             let corner = |a: usize| self.state.temperature[equations[a] as usize];
             for g in 0..general.starts[index + 1] as usize - first {
                 let temperature = match system.consistent {
@@ -125,21 +125,21 @@ impl Simulation {
     }
 
     /// Sums linear material of the elements born since `first`, by node.
-    fn linear_sums(&self, first: usize) -> Result<HashMap<u32, Sum>, Error> {
-        let mut sums: HashMap<u32, Sum> = HashMap::new();
+    fn linear_sums(&self, first: usize) -> Result<HashMap<u32, LinearSum>, Error> {
+        let mut sums: HashMap<u32, LinearSum> = HashMap::new();
         for birth in &self.problem.births[first..self.state.births] {
             for &number in &birth.elements {
                 let material = usize::from(self.problem.material_of[number as usize]);
-                let (corners, nodes) = self.problem.mesh.positions::<MOST>(number);
+                let (corners, nodes) = self.problem.mesh.positions::<FIRST_ORDER_NODES>(number);
                 let volumes = match <Geometry>::new(&corners[..nodes]) {
                     Some(geometry) => geometry.corner_volumes,
                     None => return Err(Error::Mesh(format!("element {number}: inverted"))),
                 };
                 for (&node, volume) in self.problem.mesh.nodes(number).iter().zip(volumes) {
-                    let sum = sums.entry(self.system.equation[node as usize]).or_insert(Sum {
+                    let sum = sums.entry(self.system.equation[node as usize]).or_insert(LinearSum {
                         coldest: f64::INFINITY,
                         hottest: f64::NEG_INFINITY,
-                        ..Sum::default()
+                        ..LinearSum::default()
                     });
                     let capacity = self.behaviours[material].capacity.unwrap_or(0.0) * volume;
                     sum.capacity += capacity;
@@ -153,9 +153,14 @@ impl Simulation {
     }
 
     /// Extends temperatures and points by those of new elements, and mixes at the nodes in `sums`.
-    fn migrate(&mut self, state: &mut State, added: &Added, sums: &HashMap<u32, Sum>) -> Result<(), Error> {
+    fn migrate(
+        &mut self,
+        state: &mut State,
+        added: &Added,
+        sums: &HashMap<u32, LinearSum>,
+    ) -> Result<(), Error> {
         let (problem, system) = (&self.problem, &self.system);
-        let Memory { nodal, general } = &mut state.memory;
+        let PointMemory { nodal, general } = &mut state.memory;
         let birth_of = |birth: u32| problem.births[birth as usize - 1].temperature;
         nodal.rearrange(&added.nodal, system.nodal.stride, system.nodal.energies, |nodal, point| {
             let (birth, material) = (system.nodal.birth[point], system.nodal.material[point]);
@@ -206,11 +211,11 @@ impl Simulation {
     }
 
     /// Returns the materials at a node, old and new.
-    fn parts(&self, state: &State, added: &Added, equation: u32) -> Vec<Part> {
+    fn parts(&self, state: &State, added: &Added, equation: u32) -> Vec<NodeMaterial> {
         let (problem, system) = (&self.problem, &self.system);
         let old = state.temperature[equation as usize];
         let mut parts = Vec::new();
-        let part = |points: &Points, stride: usize, moves: &Moves, point: usize| Part {
+        let part = |points: &PointStates, stride: usize, moves: &PointMoves, point: usize| NodeMaterial {
             material: 0,
             mass: 0.0,
             temperature: old,
@@ -222,23 +227,27 @@ impl Simulation {
         };
         let birth_of = |birth: u32| problem.births[birth as usize - 1].temperature;
         let nodal = &system.nodal;
-        for point in nodal.of(equation as usize) {
+        for point in nodal.points_of(equation as usize) {
             let (birth, material) = (nodal.birth[point], nodal.material[point]);
             let mass = if nodal.follows(material) { 0.0 } else { nodal.mass[point] };
-            let part =
-                Part { material, mass, ..part(&state.memory.nodal, nodal.stride, &added.nodal, point) };
-            parts.push(Part { temperature: if part.old { old } else { birth_of(birth) }, ..part });
+            let part = NodeMaterial {
+                material,
+                mass,
+                ..part(&state.memory.nodal, nodal.stride, &added.nodal, point)
+            };
+            parts.push(NodeMaterial { temperature: if part.old { old } else { birth_of(birth) }, ..part });
         }
         for (number, g) in system.around(equation, &state.born) {
             let Ok(index) = system.general.elements.binary_search(&number) else { continue };
             let material = problem.material_of[number as usize];
-            let (corners, nodes) = problem.mesh.positions::<MOST>(number);
-            let volumes = <Geometry>::new(&corners[..nodes]).map_or([0.0; MOST], |g| g.corner_volumes);
+            let (corners, nodes) = problem.mesh.positions::<FIRST_ORDER_NODES>(number);
+            let volumes =
+                <Geometry>::new(&corners[..nodes]).map_or([0.0; FIRST_ORDER_NODES], |g| g.corner_volumes);
             let mass = problem.materials[usize::from(material)].density() * volumes[g];
             let point = system.general.starts[index] as usize + g;
             let part = part(&state.memory.general, system.general.stride, &added.general, point);
             let temperature = if part.old { old } else { birth_of(state.born[number as usize]) };
-            parts.push(Part { material, mass, temperature, general: true, ..part });
+            parts.push(NodeMaterial { material, mass, temperature, general: true, ..part });
         }
         parts
     }
@@ -251,12 +260,17 @@ struct Mixture<'a> {
     /// Temperature, K.
     temperature: f64,
     existed: bool,
-    sum: &'a Sum,
+    sum: &'a LinearSum,
 }
 
 impl Mixture<'_> {
     /// Solves for the common temperature, and updates state and energy of `parts`.
-    fn settle(&self, simulation: &Simulation, fixed: Option<f64>, parts: &mut [Part]) -> Result<f64, Error> {
+    fn settle(
+        &self,
+        simulation: &Simulation,
+        fixed: Option<f64>,
+        parts: &mut [NodeMaterial],
+    ) -> Result<f64, Error> {
         let (mut low, mut high) = (self.sum.coldest, self.sum.hottest);
         if self.existed {
             (low, high) = (low.min(self.temperature), high.max(self.temperature));
@@ -271,10 +285,10 @@ impl Mixture<'_> {
             None => {
                 // a monotone function: Newton within a bracket, else bisection
                 let mut guess = 0.5 * (low + high);
-                for _ in 0..MOST_ITERATIONS {
+                for _ in 0..MAX_ITERATIONS {
                     let (mut surplus, mut slope) = (linear * guess - heat, linear);
                     for part in parts.iter() {
-                        let (energy, capacity, _) = part.at(simulation, guess)?;
+                        let (energy, capacity, _) = part.after_jump(simulation, guess)?;
                         surplus += part.mass * (energy - part.energy);
                         slope += part.mass * capacity;
                     }
@@ -297,30 +311,30 @@ impl Mixture<'_> {
             }
         };
         for part in parts {
-            let (energy, _, state) = part.at(simulation, reached)?;
+            let (energy, _, state) = part.after_jump(simulation, reached)?;
             (part.energy, part.state) = (energy, state);
         }
         Ok(reached)
     }
 }
 
-impl Part {
+impl NodeMaterial {
     /// Returns U, ∂U/∂T and the state after a jump to a temperature.
-    fn at(&self, simulation: &Simulation, temperature: f64) -> Result<(f64, f64, Vec<f64>), Error> {
+    fn after_jump(&self, simulation: &Simulation, temperature: f64) -> Result<(f64, f64, Vec<f64>), Error> {
         let material = &simulation.problem.materials[usize::from(self.material)];
         let count = material.state_names().len();
         let increment = temperature - self.temperature;
-        let at = Point { temperature: self.temperature, increment, gradient: Vector3::zeros(), dt: 0.0 };
+        let at = PointInput { temperature: self.temperature, increment, gradient: Vector3::zeros(), dt: 0.0 };
         let mut state = self.state.clone();
         let response = material.respond(&at, &self.state[..count], &mut state[..count])?;
         Ok((response.energy, response.d_energy_d_temperature, state))
     }
 }
 
-impl Memory {
+impl PointMemory {
     /// Allocates the points of a system.
-    pub(crate) fn empty(system: &System) -> Self {
-        let room = |points: usize, stride: usize, energies: usize| Points {
+    pub(crate) fn empty(system: &ThermalSystem) -> Self {
+        let room = |points: usize, stride: usize, energies: usize| PointStates {
             state: vec![0.0; points * stride],
             energy: vec![0.0; energies],
         };
@@ -333,7 +347,7 @@ impl Memory {
     }
 }
 
-impl Points {
+impl PointStates {
     /// Returns fresh material at a temperature.
     fn fresh(
         &mut self,
@@ -352,7 +366,13 @@ impl Points {
     }
 
     /// Moves points, with or without their energies; `fresh` initializes new ones.
-    fn rearrange(&mut self, moves: &Moves, stride: usize, energies: bool, fresh: impl Fn(&mut Self, usize)) {
+    fn rearrange(
+        &mut self,
+        moves: &PointMoves,
+        stride: usize,
+        energies: bool,
+        fresh: impl Fn(&mut Self, usize),
+    ) {
         let state = self.state.split_off(moves.first * stride);
         let energy = if energies { self.energy.split_off(moves.first) } else { Vec::new() };
         for (point, &from) in (moves.first..).zip(&moves.from) {

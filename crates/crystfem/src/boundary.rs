@@ -80,7 +80,7 @@ impl Schedule {
     }
 
     /// Returns the value at a time, s.
-    pub fn at(&self, time: f64) -> f64 {
+    pub fn value_at(&self, time: f64) -> f64 {
         if let (Some(period), [low, high]) = (self.period, &self.values[..]) {
             // remove whole periods first: the sine of a large argument loses digits
             let turn = (time / period).fract() * std::f64::consts::TAU;
@@ -108,7 +108,7 @@ impl Schedule {
 }
 
 /// A function of position (m) and time (s).
-pub type Function = Arc<dyn Fn([f64; 3], f64) -> f64 + Send + Sync>;
+pub type FieldFunction = Arc<dyn Fn([f64; 3], f64) -> f64 + Send + Sync>;
 
 /// A value over space and time.
 #[derive(Clone)]
@@ -116,7 +116,7 @@ pub enum Field {
     /// Uniform in space.
     Uniform(Schedule),
     /// A function of position and time; it should be smooth in time.
-    Function(Function),
+    Function(FieldFunction),
 }
 
 impl Field {
@@ -131,9 +131,9 @@ impl Field {
     }
 
     /// Returns the value at a position, m, and time, s.
-    pub fn at(&self, place: [f64; 3], time: f64) -> f64 {
+    pub fn value_at(&self, place: [f64; 3], time: f64) -> f64 {
         match self {
-            Self::Uniform(schedule) => schedule.at(time),
+            Self::Uniform(schedule) => schedule.value_at(time),
             Self::Function(function) => function(place, time),
         }
     }
@@ -177,7 +177,7 @@ impl std::fmt::Debug for Field {
 /// Faces on which a condition acts. A face counts only while it is on the current outer surface: exactly one
 /// of its elements exists.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Where {
+pub enum FaceSelection {
     /// Listed faces, in either orientation.
     Faces(Vec<Face>),
     /// Current outer surface, except some faces.
@@ -187,7 +187,7 @@ pub enum Where {
     },
 }
 
-impl Where {
+impl FaceSelection {
     /// Returns the whole current outer surface.
     pub fn outer() -> Self {
         Self::Outer { except: Vec::new() }
@@ -207,14 +207,14 @@ pub enum Condition {
     /// Heat flux into the body, W/m².
     Flux {
         /// Faces.
-        surface: Where,
+        surface: FaceSelection,
         /// Heat into the body, W/m².
         inward: Field,
     },
     /// Heat loss h (T − T_a), W/m².
     Film {
         /// Faces.
-        surface: Where,
+        surface: FaceSelection,
         /// h, W/(m² K).
         coefficient: Schedule,
         /// T_a, K.
@@ -223,7 +223,7 @@ pub enum Condition {
     /// Heat loss ε σ (T⁴ − T_a⁴), W/m².
     Radiation {
         /// Faces.
-        surface: Where,
+        surface: FaceSelection,
         /// ε, 0 to 1.
         emissivity: f64,
         /// T_a, K.
@@ -233,7 +233,7 @@ pub enum Condition {
 
 impl Condition {
     /// Faces of the condition; `None` for prescribed temperatures.
-    pub fn surface(&self) -> Option<&Where> {
+    pub fn surface(&self) -> Option<&FaceSelection> {
         match self {
             Self::Temperature { .. } => None,
             Self::Flux { surface, .. } | Self::Film { surface, .. } | Self::Radiation { surface, .. } => {
@@ -302,14 +302,14 @@ impl Condition {
 
 /// A heat source in a volume.
 #[derive(Clone, Debug)]
-pub struct Source {
+pub struct HeatSource {
     /// Elements.
     pub elements: Vec<u32>,
     /// Heat per volume, W/m³.
     pub power: Field,
 }
 
-impl Source {
+impl HeatSource {
     /// Checks the power.
     ///
     /// # Errors
@@ -329,7 +329,7 @@ mod tests {
         for (time, value) in
             [(-1.0, 300.0), (0.0, 300.0), (5.0, 350.0), (10.0, 400.0), (15.0, 375.0), (99.0, 350.0)]
         {
-            assert_eq!(ramp.at(time), value);
+            assert_eq!(ramp.value_at(time), value);
         }
         assert_eq!(ramp.breaks(), [0.0, 10.0, 20.0]);
         assert!(Schedule::constant(3.0).breaks().is_empty());
@@ -348,7 +348,7 @@ mod tests {
             (60.0, 200.0),
             (8e15, 300.0),
         ] {
-            assert!((swing.at(time) - value).abs() < 1e-12, "{time}: {}", swing.at(time));
+            assert!((swing.value_at(time) - value).abs() < 1e-12, "{time}: {}", swing.value_at(time));
         }
         assert!(swing.breaks().is_empty() && swing.period() == Some(80.0));
         for (low, high, period) in
@@ -365,8 +365,8 @@ mod tests {
     }
 
     #[test]
-    fn values_out_of_their_domain_are_named() {
-        let surface = || Where::Outer { except: Vec::new() };
+    fn invalid_values_are_refused() {
+        let surface = || FaceSelection::Outer { except: Vec::new() };
         let film = |coefficient, ambient| Condition::Film {
             surface: surface(),
             coefficient: Schedule::constant(coefficient),
@@ -380,6 +380,6 @@ mod tests {
         assert!(radiation.check().unwrap_err().to_string().contains("0 to 1"));
         let flux = Condition::Flux { surface: surface(), inward: Field::constant(f64::NAN) };
         assert!(flux.check().is_err());
-        assert!(Source { elements: vec![0], power: Field::constant(f64::INFINITY) }.check().is_err());
+        assert!(HeatSource { elements: vec![0], power: Field::constant(f64::INFINITY) }.check().is_err());
     }
 }

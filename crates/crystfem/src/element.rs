@@ -7,19 +7,19 @@
 mod face;
 pub mod natural;
 
-use crate::shape::Shape;
+use crate::shape::ElementShape;
 pub use face::FaceGeometry;
 use nalgebra::Matrix3;
-use natural::Rule;
+use natural::QuadratureRule;
 use polycore::numerics::hexahedron;
 pub use polycore::numerics::hexahedron::CORNERS;
 
 /// Maximum number of nodes, and of integration points, of a first-order element.
-pub const MOST: usize = 8;
+pub const FIRST_ORDER_NODES: usize = 8;
 /// Maximum number of nodes of any element.
-pub const WIDE: usize = 20;
+pub const MAX_ELEMENT_NODES: usize = 20;
 /// Maximum number of integration points of any element.
-pub const WIDE_POINTS: usize = 27;
+pub const MAX_ELEMENT_POINTS: usize = 27;
 
 /// 1/√3: the abscissa of the two-point Gauss rule.
 const GAUSS: f64 = 0.577_350_269_189_625_8;
@@ -29,7 +29,7 @@ const FAR: f64 = 0.138_196_601_125_010_5;
 
 /// An element at its integration points.
 #[derive(Clone, Debug)]
-pub struct Geometry<const N: usize = MOST, const P: usize = MOST> {
+pub struct Geometry<const N: usize = FIRST_ORDER_NODES, const P: usize = FIRST_ORDER_NODES> {
     /// Number of nodes.
     pub nodes: usize,
     /// Number of integration points; equals the number of nodes in first-order elements.
@@ -48,10 +48,10 @@ pub fn points(nodes: usize) -> usize {
 }
 
 /// Integration rule of wedges and second-order elements; `None` for 8-node hexahedra and 4-node tetrahedra.
-fn rule(nodes: usize) -> Option<&'static Rule> {
+fn rule(nodes: usize) -> Option<&'static QuadratureRule> {
     match nodes {
         8 | 4 => None,
-        _ => Shape::of(nodes).map(Rule::of),
+        _ => ElementShape::with_nodes(nodes).map(QuadratureRule::for_shape),
     }
 }
 
@@ -301,7 +301,7 @@ mod tests {
     /// Sides of a second-order element close it, and a curved one has the volume of the divergence theorem.
     #[test]
     fn second_order_sides_close_the_element() {
-        for shape in Shape::ALL {
+        for shape in ElementShape::ALL {
             let corners: Vec<[f64; 3]> = (0..shape.corners()).map(|k| natural::corner(shape, k)).collect();
             let middle = |&[p, q]: &[usize; 2]| [0, 1, 2].map(|d| 0.5 * (corners[p][d] + corners[q][d]));
             let all = corners.iter().copied().chain(shape.edges().iter().map(middle));
@@ -311,7 +311,7 @@ mod tests {
                 false => [x + 0.3 * y, y + 0.1 * z, z],
             };
             let places: Vec<[f64; 3]> = all.take(shape.nodes()).map(curve).collect();
-            let geometry = Geometry::<WIDE, WIDE_POINTS>::new(&places).unwrap();
+            let geometry = Geometry::<MAX_ELEMENT_NODES, MAX_ELEMENT_POINTS>::new(&places).unwrap();
             assert_eq!(geometry.points, points(shape.nodes()));
             let mass = geometry.mass();
             let volume = geometry.volume();
@@ -326,7 +326,7 @@ mod tests {
                         _ => vec![(1.0 - r) * (1.0 - s), r * (1.0 - s), r * s, (1.0 - r) * s],
                     };
                     let place = |d: usize| ring.iter().zip(&weights).map(|(&k, w)| w * corners[k][d]).sum();
-                    let natural = natural::Natural::at(shape, [place(0), place(1), place(2)]);
+                    let natural = natural::Natural::new(shape, [place(0), place(1), place(2)]);
                     nalgebra::Vector3::from(
                         [0, 1, 2].map(|d| {
                             (0..shape.nodes()).map(|a| natural.shapes[a] * places[a][d]).sum::<f64>()

@@ -61,7 +61,7 @@ pub enum Error {
         time: f64,
     },
     /// A result that is finite although the scene expects values that are not.
-    #[error("{place}: all its values are finite; allowed: some that are not, as `non_finite` says")]
+    #[error("{place}: expected a non-finite value (`non_finite = true`), found only finite ones")]
     Finite {
         /// Point of the scene.
         place: String,

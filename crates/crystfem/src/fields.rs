@@ -1,9 +1,9 @@
 //! Material states as fields over nodes and elements.
 
-use crate::element::{self, MOST, WIDE, WIDE_POINTS};
+use crate::element::{self, FIRST_ORDER_NODES, MAX_ELEMENT_NODES, MAX_ELEMENT_POINTS};
 use crate::error::Error;
 use crate::simulation::Simulation;
-use crate::system::{NONE, Points};
+use crate::system::{NONE, PointStates};
 
 /// Volume-weighted statistics of a field over nodes; not finite if a value is not.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,7 +49,14 @@ impl Simulation {
     }
 
     /// Returns a quantity of a material at one of its points; `None` if the material lacks it.
-    fn value(&self, name: &str, points: &Points, stride: usize, point: usize, material: u16) -> Option<f64> {
+    fn value(
+        &self,
+        name: &str,
+        points: &PointStates,
+        stride: usize,
+        point: usize,
+        material: u16,
+    ) -> Option<f64> {
         let law = &self.problem.materials[usize::from(material)];
         let (states, names) = (law.state_names().len(), law.field_names());
         let place = names.iter().position(|other| *other == name)?;
@@ -63,7 +70,7 @@ impl Simulation {
     fn at_node(&self, name: &str, equation: usize) -> [f64; 2] {
         let (nodal, points) = (&self.system.nodal, &self.state.memory.nodal);
         let mut sums = [0.0; 2];
-        for point in nodal.of(equation) {
+        for point in nodal.points_of(equation) {
             if let Some(value) = self.value(name, points, nodal.stride, point, nodal.material[point]) {
                 let mass = self.system.mass(&self.problem, &self.state.born, equation, point);
                 sums[0] += mass * value;
@@ -119,10 +126,10 @@ impl Simulation {
                     mass[node as usize] += weight;
                 }
             };
-            if nodes.len() > MOST {
+            if nodes.len() > FIRST_ORDER_NODES {
                 // all points of a second-order element, weighted by the squared shape function
                 let Some(geometry) = problem.mesh.geometry(number) else { continue };
-                let shapes = element::shapes::<WIDE, WIDE_POINTS>(nodes.len());
+                let shapes = element::shapes::<MAX_ELEMENT_NODES, MAX_ELEMENT_POINTS>(nodes.len());
                 for (g, shapes) in shapes.iter().enumerate().take(geometry.points) {
                     for (&node, shape) in nodes.iter().zip(shapes) {
                         add(node, density * geometry.weights[g] * shape * shape, first + g);
@@ -130,7 +137,7 @@ impl Simulation {
                 }
                 continue;
             }
-            let volumes = problem.mesh.node_volumes(number).unwrap_or([0.0; WIDE]);
+            let volumes = problem.mesh.node_volumes(number).unwrap_or([0.0; MAX_ELEMENT_NODES]);
             for (g, &node) in nodes.iter().enumerate() {
                 add(node, density * volumes[g], first + g);
             }
@@ -156,7 +163,7 @@ impl Simulation {
                 let own = |point: &usize| {
                     system.nodal.material[*point] == like && system.nodal.birth[*point] == birth
                 };
-                let found = system.nodal.of(equation as usize).find(own);
+                let found = system.nodal.points_of(equation as usize).find(own);
                 let (points, stride) = (&self.state.memory.nodal, system.nodal.stride);
                 let found = found.and_then(|point| self.value(name, points, stride, point, material));
                 if let Some(found) = found {
@@ -196,7 +203,7 @@ impl Simulation {
         if let Some(wrong) = state.temperature.iter().position(|t| !t.is_finite()) {
             return fail("temperature", system.nodes()[wrong]);
         }
-        let wrong = |points: &Points, stride: usize| -> Option<(usize, Option<usize>)> {
+        let wrong = |points: &PointStates, stride: usize| -> Option<(usize, Option<usize>)> {
             let in_state = points.state.iter().position(|x| !x.is_finite());
             let in_energy = || points.energy.iter().position(|x| !x.is_finite()).map(|point| (point, None));
             in_state.map(|at| (at / stride, Some(at % stride))).or_else(in_energy)
@@ -226,7 +233,7 @@ impl Simulation {
     pub fn volumes(&self, elements: &[u32]) -> Vec<f64> {
         let mut volumes = vec![0.0; self.problem.mesh.points.len()];
         for &number in elements.iter().filter(|&&element| self.is_born(element)) {
-            let own = self.problem.mesh.node_volumes(number).unwrap_or([0.0; WIDE]);
+            let own = self.problem.mesh.node_volumes(number).unwrap_or([0.0; MAX_ELEMENT_NODES]);
             for (&node, own) in self.problem.mesh.nodes(number).iter().zip(own) {
                 volumes[node as usize] += own;
             }

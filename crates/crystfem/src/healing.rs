@@ -152,7 +152,7 @@ fn positive(named: &[(&'static str, f64)]) -> Result<(), Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kinetics::{Constants, Kinetics};
+    use crate::kinetics::{KineticConstants, Kinetics};
     use evidence::near;
 
     /// 190 to 130 °C at 40 K/s, 2 s at 180 °C, 60 kJ/mol, no crystals.
@@ -175,8 +175,8 @@ mod tests {
 
     /// Hold at 165 °C during crystallization: ∫(1 − α)dt/τ = Γ(1 + 1/n)/(Kτ).
     #[test]
-    fn crystals_end_it() {
-        let kinetics = Kinetics::new(Constants::TABLE_4_1_COLUMN_1).unwrap();
+    fn crystals_stop_healing() {
+        let kinetics = Kinetics::new(KineticConstants::TABLE_4_1_COLUMN_1).unwrap();
         let healing = Healing::new(1000.0, 438.15, 60e3).unwrap();
         let (rate, steps) = (kinetics.rate(438.15), 4000);
         let dt = 4.0 / rate / steps as f64;
@@ -188,7 +188,7 @@ mod tests {
 
     /// WLF slows healing by 10^6.63 from T_g + 100 K to T_g + 20 K, Arrhenius at 60 kJ/mol by 10^1.8.
     #[test]
-    fn the_glass_stops_it() {
+    fn glass_transition_stops_healing() {
         let arrhenius = Healing::new(2.0, 453.15, 60e3).unwrap();
         let healing = arrhenius.with_glass(Glass::universal(318.15)).unwrap();
         let factor = |law: Healing| (law.rate(418.15) / law.rate(338.15)).log10();

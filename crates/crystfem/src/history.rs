@@ -4,7 +4,7 @@ use crate::error::Error;
 
 /// A piecewise linear temperature history.
 #[derive(Clone, Debug, PartialEq)]
-pub struct History {
+pub struct TemperatureHistory {
     /// Times, s; equal neighbours mark a jump.
     times: Vec<f64>,
     /// Temperatures, K.
@@ -37,16 +37,16 @@ pub enum Leg {
 
 /// A linear segment of a history.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Segment {
+pub struct HistorySegment {
     /// Times, s.
     pub times: [f64; 2],
     /// Temperatures, K.
     pub temperatures: [f64; 2],
 }
 
-impl Segment {
+impl HistorySegment {
     /// Interpolates the temperature at a time within the segment, K.
-    pub fn at(&self, time: f64) -> f64 {
+    pub fn temperature_at(&self, time: f64) -> f64 {
         let [from, to] = self.temperatures;
         let duration = self.times[1] - self.times[0];
         if time >= self.times[1] || duration == 0.0 {
@@ -56,7 +56,7 @@ impl Segment {
     }
 }
 
-impl History {
+impl TemperatureHistory {
     /// Returns a history through points.
     ///
     /// # Errors
@@ -83,7 +83,8 @@ impl History {
     /// Builds a history of legs from time 0 and a temperature, K.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for rates that are not above 0, durations below 0, and as for [`History::new`].
+    /// [`Error::Parameter`] for rates that are not above 0, durations below 0, and as for
+    /// [`TemperatureHistory::new`].
     pub fn from_legs(start: f64, legs: &[Leg]) -> Result<Self, Error> {
         let (mut times, mut temperatures) = (vec![0.0], vec![start]);
         let (mut time, mut temperature) = (0.0, start);
@@ -115,11 +116,13 @@ impl History {
     /// # Errors
     /// [`Error::File`] as for `table::read`, and for times that decrease.
     pub fn read(path: &std::path::Path) -> Result<Self, Error> {
-        use crate::table::{Column, read_with_lines};
+        use crate::table::{TableColumn, read_with_lines};
         use polycore::units::dimension::{TemperatureDimension, TimeDimension};
 
-        let columns =
-            [Column::of::<TimeDimension>("time"), Column::of::<TemperatureDimension>("temperature")];
+        let columns = [
+            TableColumn::new::<TimeDimension>("time"),
+            TableColumn::new::<TemperatureDimension>("temperature"),
+        ];
         let ([times, temperatures], lines) = read_with_lines(path, columns)?;
         if let Some(row) = (1..times.len()).find(|&row| times[row] < times[row - 1]) {
             return Err(Error::File {
@@ -144,8 +147,8 @@ impl History {
     }
 
     /// Segments, jumps included.
-    pub fn segments(&self) -> impl Iterator<Item = Segment> + '_ {
-        (1..self.times.len()).map(|i| Segment {
+    pub fn segments(&self) -> impl Iterator<Item = HistorySegment> + '_ {
+        (1..self.times.len()).map(|i| HistorySegment {
             times: [self.times[i - 1], self.times[i]],
             temperatures: [self.temperatures[i - 1], self.temperatures[i]],
         })
@@ -164,33 +167,40 @@ mod tests {
             Leg::Time { to: 450.0, duration: 0.0 },
             Leg::Time { to: 400.0, duration: 100.0 },
         ];
-        let history = History::from_legs(470.0, &legs).unwrap();
+        let history = TemperatureHistory::from_legs(470.0, &legs).unwrap();
         assert_eq!((history.start(), history.span()), (470.0, [0.0, 320.0]));
-        let segments: Vec<Segment> = history.segments().collect();
-        assert_eq!(segments[0].at(80.0), 430.0);
+        let segments: Vec<HistorySegment> = history.segments().collect();
+        assert_eq!(segments[0].temperature_at(80.0), 430.0);
         assert_eq!(
-            (segments[2].at(220.0), segments[3].at(320.0), segments[3].at(400.0)),
+            (
+                segments[2].temperature_at(220.0),
+                segments[3].temperature_at(320.0),
+                segments[3].temperature_at(400.0)
+            ),
             (450.0, 400.0, 400.0)
         );
     }
 
     #[test]
     fn refusals() {
-        let message = |legs: &[Leg]| History::from_legs(400.0, legs).unwrap_err().to_string();
+        let message = |legs: &[Leg]| TemperatureHistory::from_legs(400.0, legs).unwrap_err().to_string();
         assert!(message(&[Leg::Rate { to: 300.0, rate: -1.0 }]).contains("found -1; allowed: above 0"));
         assert!(message(&[Leg::Rate { to: 300.0, rate: 1e-320 }]).contains("found inf"));
         assert!(message(&[Leg::Hold { duration: f64::NAN }]).contains("found NaN"));
         assert!(message(&[Leg::Time { to: -1.0, duration: 1.0 }]).contains("found -1; allowed: 0 or above"));
-        assert!(History::new(vec![], vec![]).is_err());
+        assert!(TemperatureHistory::new(vec![], vec![]).is_err());
         assert!(
-            History::new(vec![1.0, 0.0], vec![300.0, 300.0]).unwrap_err().to_string().contains("1 or later")
+            TemperatureHistory::new(vec![1.0, 0.0], vec![300.0, 300.0])
+                .unwrap_err()
+                .to_string()
+                .contains("1 or later")
         );
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("h.csv");
         std::fs::write(&path, "time [s],temperature [degC]\n0,20\n10,30\n5,40\n").unwrap();
-        let error = History::read(&path).unwrap_err().to_string();
+        let error = TemperatureHistory::read(&path).unwrap_err().to_string();
         assert!(error.contains("h.csv:4: time: found \"5 s\"; allowed: 10 s or later"), "{error}");
         std::fs::write(&path, "time [min],temperature [degC]\n0,20\n10,30\n").unwrap();
-        assert_eq!(History::read(&path).unwrap().span(), [0.0, 600.0]);
+        assert_eq!(TemperatureHistory::read(&path).unwrap().span(), [0.0, 600.0]);
     }
 }

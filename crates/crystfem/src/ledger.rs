@@ -5,7 +5,7 @@ pub use crate::system::Exchange;
 /// Shift of temperature, K, that sets the smallest reference of a relative balance: a step that moves less
 /// heat than a uniform shift by this is measured against the latter. Temperatures of 500 K are known to 6e-14
 /// K only.
-pub const NOTHING: f64 = 1e-2;
+pub const REFERENCE_SHIFT: f64 = 1e-2;
 
 /// Energies since the start, J. Heat into the body is positive.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -20,13 +20,13 @@ pub struct Ledger {
     pub birth: f64,
     /// Sum of the magnitudes of the imbalances of steps and births.
     pub missing: f64,
-    /// Largest relative imbalance of a step or a birth, see [`Record::relative`].
+    /// Largest relative imbalance of a step or a birth, see [`StepBalance::relative`].
     pub worst: f64,
 }
 
 /// Energy balance of an accepted step, J.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Record {
+pub struct StepBalance {
     /// Time at the end, s.
     pub time: f64,
     /// Length, s.
@@ -50,23 +50,23 @@ pub struct Record {
     pub step_ratio: Option<f64>,
 }
 
-impl Record {
+impl StepBalance {
     /// Imbalance stored − in + out, J.
     pub fn missing(&self) -> f64 {
         self.stored - self.exchange.total() - self.reaction
     }
 
     /// Relative imbalance: |[`Self::missing`]| over all heat moved, stored and exchanged, or over that of a
-    /// shift by [`NOTHING`], 10 mK, if larger.
+    /// shift by [`REFERENCE_SHIFT`], 10 mK, if larger.
     pub fn relative(&self) -> f64 {
-        let scale = (self.moved + self.exchange.gross() + self.held).max(NOTHING * self.sensitivity);
+        let scale = (self.moved + self.exchange.gross() + self.held).max(REFERENCE_SHIFT * self.sensitivity);
         if scale > 0.0 { self.missing().abs() / scale } else { 0.0 }
     }
 }
 
 impl Ledger {
     /// Adds a step.
-    pub fn add(&mut self, step: &Record) {
+    pub fn add(&mut self, step: &StepBalance) {
         self.stored += step.stored;
         self.exchange.add(1.0, &step.exchange);
         self.reaction += step.reaction;

@@ -2,8 +2,8 @@
 //! adiabatic.
 
 use crate::error::Error;
-use crate::history::{History, Segment};
-use crate::material::{Point, ThermalMaterial};
+use crate::history::{HistorySegment, TemperatureHistory};
+use crate::material::{PointInput, ThermalMaterial};
 use nalgebra::Vector3;
 use root::root;
 
@@ -16,7 +16,7 @@ pub use material_point::MaterialPoint;
 #[derive(Clone, Debug, PartialEq)]
 pub enum Drive {
     /// Given history.
-    Prescribed(History),
+    Prescribed(TemperatureHistory),
     /// Newton's cooling, dU/dt = −c (T − T_a)/τ, with the initial heat capacity c; adiabatic without
     /// exchange.
     Lumped {
@@ -52,10 +52,10 @@ impl Default for Stepping {
 }
 
 /// Limit on the steps of a curve.
-pub const MOST_STEPS: usize = 1_000_000;
+pub const MAX_STEPS: usize = 1_000_000;
 
 /// A material with its thermal process.
-pub struct Course<'a> {
+pub struct PointProcess<'a> {
     /// The material.
     pub material: &'a dyn ThermalMaterial,
     /// Source of the temperature.
@@ -80,14 +80,14 @@ pub struct Curves {
     /// Fields of the material, a vector per row.
     pub fields: Vec<Vec<f64>>,
     /// Segment of the history on which each row's step ends.
-    segments: Vec<Option<Segment>>,
+    segments: Vec<Option<HistorySegment>>,
     /// Number of rejected steps.
     pub rejected: usize,
 }
 
 /// Time and temperature of an event.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Event {
+pub struct CurveEvent {
     /// Time, s.
     pub time: f64,
     /// Temperature, K.
@@ -97,18 +97,18 @@ pub struct Event {
 }
 
 /// Values at the end of a step.
-struct End {
+struct StepEnd {
     temperature: f64,
     energy: f64,
     state: Vec<f64>,
     step_ratio: Option<f64>,
 }
 
-impl Course<'_> {
+impl PointProcess<'_> {
     /// Computes the curves.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for steps that are not above 0 or more than [`MOST_STEPS`]; errors of the
+    /// [`Error::Parameter`] for steps that are not above 0 or more than [`MAX_STEPS`]; errors of the
     /// material.
     pub fn run(&self) -> Result<Curves, Error> {
         self.check()?;
@@ -124,7 +124,7 @@ impl Course<'_> {
         };
         let mut curves = Curves::default();
         let energy = self.material.energy(start, &state);
-        self.record(&mut curves, time, None, End { temperature: start, energy, state, step_ratio: None });
+        self.record(&mut curves, time, None, StepEnd { temperature: start, energy, state, step_ratio: None });
         for segment in segments {
             self.follow(&mut curves, segment)?;
         }
@@ -159,7 +159,7 @@ impl Course<'_> {
             ),
             _ => (0.0, 0.0),
         };
-        if steps > MOST_STEPS as f64 {
+        if steps > MAX_STEPS as f64 {
             let allowed = format!("one that makes at most {MOST_STEPS} steps");
             return Err(Error::Parameter { name: "step (s or K)", found: step, allowed });
         }
@@ -174,10 +174,10 @@ impl Course<'_> {
     }
 
     /// Steps through a segment, or through the whole duration of a lumped body.
-    fn follow(&self, curves: &mut Curves, segment: Option<Segment>) -> Result<(), Error> {
+    fn follow(&self, curves: &mut Curves, segment: Option<HistorySegment>) -> Result<(), Error> {
         let (begin, end, slope) = match (&self.drive, &segment) {
             (Drive::Lumped { duration, .. }, _) => (0.0, *duration, 0.0),
-            (_, Some(Segment { times: [a, b], temperatures: [from, to] })) => {
+            (_, Some(HistorySegment { times: [a, b], temperatures: [from, to] })) => {
                 (*a, *b, if b > a { (to - from) / (b - a) } else { 0.0 })
             }
             _ => return Ok(()),
@@ -222,7 +222,7 @@ impl Course<'_> {
             if last {
                 return Ok(());
             }
-            if curves.time.len() > MOST_STEPS {
+            if curves.time.len() > MAX_STEPS {
                 let allowed = format!("steps that make at most {MOST_STEPS}");
                 return Err(Error::Parameter { name: "time step, s", found: dt, allowed });
             }
@@ -235,7 +235,7 @@ impl Course<'_> {
     }
 
     /// Ratio of allowed to actual change of a step.
-    fn ratio(&self, curves: &Curves, row: usize, found: &End) -> f64 {
+    fn ratio(&self, curves: &Curves, row: usize, found: &StepEnd) -> f64 {
         let Stepping::Adaptive { degree, kelvin } = self.stepping else { return 1.0 };
         let mut ratio = f64::INFINITY;
         if let (Some(_), Some(index)) = (found.step_ratio, self.degree_index()) {
@@ -255,15 +255,16 @@ impl Course<'_> {
         &self,
         curves: &Curves,
         row: usize,
-        segment: Option<&Segment>,
+        segment: Option<&HistorySegment>,
         from: f64,
         to: f64,
         dt: f64,
-    ) -> Result<End, Error> {
+    ) -> Result<StepEnd, Error> {
         let start = curves.temperature[row];
         let mut state = vec![0.0; self.material.state_names().len()];
         let mut respond = |end: f64| {
-            let at = Point { temperature: start, increment: end - start, gradient: Vector3::zeros(), dt };
+            let at =
+                PointInput { temperature: start, increment: end - start, gradient: Vector3::zeros(), dt };
             self.material.respond(&at, &curves.states[row], &mut state)
         };
         let temperature = match (&self.drive, segment) {
@@ -280,12 +281,12 @@ impl Course<'_> {
                     Ok([response.energy - before + lost, response.d_energy_d_temperature + slope])
                 })?
             }
-            (Drive::Prescribed(_), Some(segment)) if from < to => segment.at(to),
+            (Drive::Prescribed(_), Some(segment)) if from < to => segment.temperature_at(to),
             (Drive::Prescribed(_), Some(segment)) => segment.temperatures[1],
             (Drive::Prescribed(_), None) => start,
         };
         let response = respond(temperature)?;
-        Ok(End { temperature, energy: response.energy, state, step_ratio: response.step_ratio })
+        Ok(StepEnd { temperature, energy: response.energy, state, step_ratio: response.step_ratio })
     }
 
     /// Heat capacity at constant state, J/(kg K).
@@ -296,7 +297,7 @@ impl Course<'_> {
         above - below
     }
 
-    fn record(&self, curves: &mut Curves, time: f64, segment: Option<Segment>, end: End) {
+    fn record(&self, curves: &mut Curves, time: f64, segment: Option<HistorySegment>, end: StepEnd) {
         let mut fields = vec![0.0; self.material.field_names().len()];
         self.material.fields(&end.state, &mut fields);
         curves.time.push(time);
@@ -316,8 +317,8 @@ impl Course<'_> {
     /// Locates the first upward crossing of α through a degree, by repeating its step, to rounding.
     ///
     /// # Errors
-    /// Errors of [`Course::run`].
-    pub fn reaching(&self, curves: &Curves, degree: f64) -> Result<Option<Event>, Error> {
+    /// Errors of [`PointProcess::run`].
+    pub fn reaching(&self, curves: &Curves, degree: f64) -> Result<Option<CurveEvent>, Error> {
         let Some(index) = self.degree_index() else { return Ok(None) };
         let alpha = |row: usize| curves.fields[row][index];
         let Some(row) = (1..curves.time.len()).find(|&row| alpha(row - 1) < degree && alpha(row) >= degree)
@@ -338,15 +339,18 @@ impl Course<'_> {
     /// Locates the maximum of dα/dt, by golden section around the largest row.
     ///
     /// # Errors
-    /// Errors of [`Course::run`].
-    pub fn peak(&self, curves: &Curves) -> Result<Option<Event>, Error> {
+    /// Errors of [`PointProcess::run`].
+    pub fn peak(&self, curves: &Curves) -> Result<Option<CurveEvent>, Error> {
         let rows = curves.time.len();
         let finite = (0..rows).filter(|&row| curves.rate[row] > 0.0 && curves.rate[row].is_finite());
         let Some(top) = finite.max_by(|&a, &b| curves.rate[a].total_cmp(&curves.rate[b])) else {
             return Ok(None);
         };
-        let mut best =
-            Event { time: curves.time[top], temperature: curves.temperature[top], rate: curves.rate[top] };
+        let mut best = CurveEvent {
+            time: curves.time[top],
+            temperature: curves.temperature[top],
+            rate: curves.rate[top],
+        };
         for row in [top, top + 1].into_iter().filter(|&row| row > 0 && row < rows) {
             let (mut low, mut high) = (0.0, 1.0);
             let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
@@ -363,15 +367,15 @@ impl Course<'_> {
         Ok(Some(best))
     }
 
-    fn event(&self, curves: &Curves, row: usize, share: f64) -> Result<Event, Error> {
+    fn event(&self, curves: &Curves, row: usize, share: f64) -> Result<CurveEvent, Error> {
         let end = self.within(curves, row, share)?;
         let time = curves.time[row - 1] + share * (curves.time[row] - curves.time[row - 1]);
         let rate = self.material.crystallization_rate(end.temperature, &end.state);
-        Ok(Event { time, temperature: end.temperature, rate })
+        Ok(CurveEvent { time, temperature: end.temperature, rate })
     }
 
     /// Repeats a fraction of the step that ended at a row.
-    fn within(&self, curves: &Curves, row: usize, share: f64) -> Result<End, Error> {
+    fn within(&self, curves: &Curves, row: usize, share: f64) -> Result<StepEnd, Error> {
         let [from, to] = [curves.time[row - 1], curves.time[row]];
         let dt = share * (to - from);
         if to > from {
@@ -379,7 +383,7 @@ impl Course<'_> {
         }
         // a fraction of a jump
         let [a, b] = [curves.temperature[row - 1], curves.temperature[row]];
-        let jump = Segment { times: [from, from], temperatures: [a, a + share * (b - a)] };
+        let jump = HistorySegment { times: [from, from], temperatures: [a, a + share * (b - a)] };
         self.step(curves, row - 1, Some(&jump), from, from, 0.0)
     }
 }

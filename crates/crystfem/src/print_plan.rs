@@ -60,7 +60,7 @@ impl PrintPlan {
         for (time, elements) in groups(times, window)? {
             let time = start + time;
             if let Some(schedule) = temperature {
-                births.push(Birth { time, elements, temperature: schedule.at(time) });
+                births.push(Birth { time, elements, temperature: schedule.value_at(time) });
                 continue;
             }
             // the temperature at deposition, not at birth: tools differ

@@ -1,10 +1,10 @@
 //! Printed parts in a few lines: a mesh with layers or a tool path, a material, boundary conditions.
 
-use crate::boundary::{Condition, Field, Schedule, Where};
+use crate::boundary::{Condition, FaceSelection, Field, Schedule};
 use crate::error::Error;
 use crate::material::{ThermalMaterial, fill_elements};
 use crate::mesh::layers::Layers;
-use crate::mesh::path::{Cells, ToolPath};
+use crate::mesh::path::{CellSettings, ToolPath};
 use crate::mesh::{Bar, Face, Mesh};
 use crate::print_plan::PrintPlan;
 use crate::problem::Problem;
@@ -31,7 +31,7 @@ pub struct PrintedPart {
     temperature: Option<f64>,
     held: Vec<(String, f64)>,
     /// Conditions on the outer surface without the held faces, as functions of it.
-    outer: Vec<Box<dyn Fn(Where) -> Condition>>,
+    outer: Vec<Box<dyn Fn(FaceSelection) -> Condition>>,
 }
 
 impl PrintedPart {
@@ -46,7 +46,7 @@ impl PrintedPart {
     /// Errors of [`ToolPath::deposit`].
     pub fn along(
         path: ToolPath,
-        cells: &Cells,
+        cells: &CellSettings,
         material: impl ThermalMaterial + 'static,
     ) -> Result<Self, Error> {
         let deposit = path.deposit(cells)?;
@@ -157,7 +157,7 @@ impl PrintedPart {
                 start = temperature;
             }
             None if beside > 0 => {
-                return Err(Error::Mesh(format!("{beside} elements are in no layer; allowed: a substrate")));
+                return Err(Error::Mesh(format!("{beside} elements are in no layer: they need a substrate")));
             }
             None => {}
         }
@@ -172,7 +172,8 @@ impl PrintedPart {
             let nodes = mesh.nodes_of(faces);
             conditions.push(Condition::Temperature { nodes, value: Field::constant(kelvin) });
         }
-        conditions.extend(outer.iter().map(|condition| condition(Where::Outer { except: except.clone() })));
+        conditions
+            .extend(outer.iter().map(|condition| condition(FaceSelection::Outer { except: except.clone() })));
         let whole = Problem::new(mesh, materials[0].clone(), start);
         if let Some((parts, part_of)) = &fill {
             fill_elements(&mut materials, &mut material_of, parts, part_of)?;

@@ -1,6 +1,6 @@
 //! Problem definition: mesh, materials, conditions, and times at which elements appear.
 
-use crate::boundary::{Condition, Field, Source, Where};
+use crate::boundary::{Condition, FaceSelection, Field, HeatSource};
 use crate::error::Error;
 use crate::material::ThermalMaterial;
 use crate::mesh::{Face, Mesh};
@@ -45,7 +45,7 @@ pub struct Problem {
     /// Conditions on nodes and faces.
     pub conditions: Vec<Condition>,
     /// Heat sources in elements.
-    pub sources: Vec<Source>,
+    pub sources: Vec<HeatSource>,
     /// Births, in the order of time.
     pub births: Vec<Birth>,
     /// Elements that never appear.
@@ -171,8 +171,8 @@ impl Problem {
                 )));
             }
             let faces: &[Face] = match condition.surface() {
-                Some(Where::Faces(faces)) => faces,
-                Some(Where::Outer { except }) => except,
+                Some(FaceSelection::Faces(faces)) => faces,
+                Some(FaceSelection::Outer { except }) => except,
                 None => &[],
             };
             if let Some(face) = faces.iter().find(|&&face| self.mesh.face_nodes(face).is_empty()) {

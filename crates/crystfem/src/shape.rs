@@ -14,9 +14,9 @@ const TETRAHEDRON_EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [2, 0], [0, 3], [1, 
 const WEDGE_EDGES: [[usize; 2]; 9] = [[0, 1], [1, 2], [2, 0], [3, 4], [4, 5], [5, 3], [0, 3], [1, 4], [2, 5]];
 
 /// An element type. Nodes are in the order of Abaqus (C3D8, C3D4, C3D6, C3D20, C3D10, C3D15): corners, then
-/// the node on the middle of each edge in the order of [`Shape::edges`].
+/// the node on the middle of each edge in the order of [`ElementShape::edges`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Shape {
+pub enum ElementShape {
     /// 8 nodes.
     Hexahedron,
     /// 4 nodes.
@@ -31,7 +31,7 @@ pub enum Shape {
     Wedge15,
 }
 
-impl Shape {
+impl ElementShape {
     /// All types.
     pub const ALL: [Self; 6] = [
         Self::Hexahedron,
@@ -55,7 +55,7 @@ impl Shape {
     }
 
     /// Returns the type with this number of nodes.
-    pub fn of(nodes: usize) -> Option<Self> {
+    pub fn with_nodes(nodes: usize) -> Option<Self> {
         Self::ALL.into_iter().find(|shape| shape.nodes() == nodes)
     }
 
@@ -174,14 +174,14 @@ impl Shape {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cell {
     /// Type.
-    pub shape: Shape,
+    pub shape: ElementShape,
     nodes: [u32; 20],
 }
 
 impl Cell {
     /// Returns an element with these nodes; `None` if no type has as many.
     pub fn new(nodes: &[u32]) -> Option<Self> {
-        let mut cell = Self { shape: Shape::of(nodes.len())?, nodes: [u32::MAX; 20] };
+        let mut cell = Self { shape: ElementShape::with_nodes(nodes.len())?, nodes: [u32::MAX; 20] };
         cell.nodes[..nodes.len()].copy_from_slice(nodes);
         Some(cell)
     }

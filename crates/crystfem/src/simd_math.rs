@@ -6,9 +6,9 @@ const ROUNDER: f64 = 6_755_399_441_055_744.0;
 /// ln 2, split into its first 32 bits and the remainder.
 const LN_2: [f64; 2] = [6.931_471_803_691_238e-1, 1.908_214_929_270_587_7e-10];
 /// Largest |x| for [`expm1_small`].
-pub const SMALL: f64 = 0.1;
+pub const MAX_SMALL_ARGUMENT: f64 = 0.1;
 /// Smallest x with a nonzero result.
-const LEAST: f64 = -708.0;
+const MIN_EXPONENT: f64 = -708.0;
 
 /// 1/k!, k = 13, 12 … 2.
 const FACTORIALS: [f64; 12] = [
@@ -29,7 +29,7 @@ const FACTORIALS: [f64; 12] = [
 /// eˣ for x ≤ 709; 0 below −708.
 #[inline(always)]
 pub fn exp(x: f64) -> f64 {
-    let held = x.max(LEAST);
+    let held = x.max(MIN_EXPONENT);
     let rounded = held.mul_add(std::f64::consts::LOG2_E, ROUNDER);
     let whole = rounded - ROUNDER;
     let rest = whole.mul_add(-LN_2[1], whole.mul_add(-LN_2[0], held));
@@ -39,7 +39,7 @@ pub fn exp(x: f64) -> f64 {
     }
     let sum = (sum * rest).mul_add(rest, rest) + 1.0;
     let scale = f64::from_bits((rounded.to_bits() << 52).wrapping_add(1.0_f64.to_bits()));
-    if x < LEAST { 0.0 } else { sum * scale }
+    if x < MIN_EXPONENT { 0.0 } else { sum * scale }
 }
 
 /// ln x of a positive normal x.
@@ -65,7 +65,7 @@ pub fn ln_1p(x: f64) -> f64 {
     (2.0 * s).mul_add(series::<17>(s * s), 2.0 * s)
 }
 
-/// eˣ − 1 for |x| ≤ [`SMALL`].
+/// eˣ − 1 for |x| ≤ [`MAX_SMALL_ARGUMENT`].
 #[inline(always)]
 pub fn expm1_small(x: f64) -> f64 {
     let mut sum = FACTORIALS[2];
@@ -113,7 +113,7 @@ mod tests {
 
     /// Results agree with the standard library over their ranges, to four times 2⁻⁵².
     #[test]
-    fn they_are_those_of_the_library() {
+    fn results_agree_with_the_standard_library() {
         let near = |found: f64, exact: f64, of: f64| {
             assert!((found - exact).abs() <= 4.0 * f64::EPSILON * exact.abs(), "{of}: {found:e} {exact:e}");
         };

@@ -5,13 +5,13 @@ mod step;
 
 use crate::error::Error;
 pub use crate::fields::Statistics;
-use crate::ledger::{Ledger, Record};
+use crate::ledger::{Ledger, StepBalance};
 use crate::problem::Problem;
-use crate::solver::Task;
-pub use crate::solver::{Choice, LinearSolver, Method};
-use crate::system::{Behaviour, Exchange, NONE, System};
-pub use crate::system::{Memory, Points};
-use crate::time::{Scheme, Start, Stepper, Steps, Work};
+use crate::solver::LinearTask;
+pub use crate::solver::{LinearMethod, LinearSolver, SolverChoice};
+use crate::system::{Exchange, MaterialBehaviour, NONE, ThermalSystem};
+pub use crate::system::{PointMemory, PointStates};
+use crate::time::{Scheme, StepStart, Stepper, Steps, Work};
 use polycore::numerics::bounds;
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -85,7 +85,7 @@ pub struct State {
     /// Heat supplied at this time, W.
     pub exchange: Exchange,
     /// Material points.
-    pub memory: Memory,
+    pub memory: PointMemory,
     /// Birth of each element, from 1; 0 for elements from the start, [`u32::MAX`] for unborn ones.
     pub born: Vec<u32>,
     /// Number of past births.
@@ -95,7 +95,7 @@ pub struct State {
     /// True right after a jump.
     pub jump: bool,
     /// Method for linear systems since the last jump.
-    pub method: Method,
+    pub method: LinearMethod,
     /// Iterations since the last choice of method, in steps whose solves took many.
     pub excess: f64,
     /// Energies since the start.
@@ -106,9 +106,9 @@ pub struct State {
 
 impl State {
     /// Initial values of a step.
-    pub(crate) fn start(&self) -> Start<'_> {
+    pub(crate) fn start(&self) -> StepStart<'_> {
         let Self { time, temperature, slope, rate, exchange, memory, .. } = self;
-        Start { time: *time, temperature, slope, rate, exchange, memory }
+        StepStart { time: *time, temperature, slope, rate, exchange, memory }
     }
 }
 
@@ -116,8 +116,8 @@ impl State {
 pub struct Simulation {
     pub(crate) problem: Arc<Problem>,
     pub(crate) settings: Settings,
-    pub(crate) behaviours: Vec<Behaviour>,
-    pub(crate) system: System,
+    pub(crate) behaviours: Vec<MaterialBehaviour>,
+    pub(crate) system: ThermalSystem,
     pub(crate) state: State,
     stepper: Stepper,
     breaks: Vec<f64>,
@@ -145,12 +145,12 @@ impl Simulation {
         if let Steps::Adaptive { first, .. } = settings.steps {
             state.next_dt = first;
         }
-        let system = System::build(&problem, &behaviours, &state.born, 0)?;
+        let system = ThermalSystem::build(&problem, &behaviours, &state.born, 0)?;
         (state.work.builds, state.work.visited) = (1, system.elements as u64);
         state.temperature = system
             .nodes()
             .iter()
-            .map(|&n| problem.initial.at(problem.mesh.points[n as usize], 0.0))
+            .map(|&n| problem.initial.value_at(problem.mesh.points[n as usize], 0.0))
             .collect();
         if let Some(found) = state.temperature.iter().copied().find(|t| !(*t >= 0.0 && t.is_finite())) {
             let allowed = "an absolute temperature, 0 K or above".into();
@@ -179,7 +179,7 @@ impl Simulation {
                 problem.material_of.len()
             )));
         }
-        let system = System::build(&problem, &behaviours, &state.born, state.births)?;
+        let system = ThermalSystem::build(&problem, &behaviours, &state.born, state.births)?;
         let size = system.size();
         let fits = |list: &[f64]| list.is_empty() || list.len() == size;
         let memory = &state.memory;
@@ -205,13 +205,13 @@ impl Simulation {
         Ok(Self { problem, settings, behaviours, system, state, stepper: Stepper::default(), breaks })
     }
 
-    fn prepare(problem: &Problem, settings: &Settings) -> Result<(Vec<Behaviour>, Vec<f64>), Error> {
+    fn prepare(problem: &Problem, settings: &Settings) -> Result<(Vec<MaterialBehaviour>, Vec<f64>), Error> {
         settings.check()?;
         problem.check()?;
         let behaviours = problem
             .materials
             .iter()
-            .map(|material| Behaviour::of(&**material, problem.capacity))
+            .map(|material| MaterialBehaviour::from_material(&**material, problem.capacity))
             .collect::<Result<_, _>>()?;
         Ok((behaviours, problem.breaks()))
     }
@@ -266,7 +266,7 @@ impl Simulation {
     pub fn advance(
         &mut self,
         until: f64,
-        observe: &mut (dyn FnMut(&Self, &Record) -> ControlFlow<()> + Send),
+        observe: &mut (dyn FnMut(&Self, &StepBalance) -> ControlFlow<()> + Send),
     ) -> Result<ControlFlow<()>, Error> {
         self.advance_unless(&|| false, until, observe)
     }
@@ -280,7 +280,7 @@ impl Simulation {
         &mut self,
         stop: &(dyn Fn() -> bool + Sync),
         until: f64,
-        observe: &mut (dyn FnMut(&Self, &Record) -> ControlFlow<()> + Send),
+        observe: &mut (dyn FnMut(&Self, &StepBalance) -> ControlFlow<()> + Send),
     ) -> Result<ControlFlow<()>, Error> {
         if !(until >= self.state.time && until.is_finite()) {
             let allowed = format!("{} s (now) or later, finite", self.state.time);
@@ -331,17 +331,17 @@ impl Simulation {
     }
 
     /// Returns the linear solver for a run to a time, with the reason.
-    pub fn choose(&self, until: f64) -> Choice {
+    pub fn choose(&self, until: f64) -> SolverChoice {
         self.task(until).choose()
     }
 
     /// Estimates the entries of the matrix factors in a run to a time; 0 without factors.
     pub fn factors(&self, until: f64) -> f64 {
         let task = self.task(until);
-        if task.choose().method == Method::Factors { task.factor_entries() } else { 0.0 }
+        if task.choose().method == LinearMethod::Factors { task.factor_entries() } else { 0.0 }
     }
 
-    pub(crate) fn task(&self, until: f64) -> Task {
+    pub(crate) fn task(&self, until: f64) -> LinearTask {
         let (equal_steps, dt) = match self.settings.steps {
             Steps::Fixed { dt } => (true, dt),
             Steps::Adaptive { first, .. } => (false, first),
@@ -360,7 +360,7 @@ impl Simulation {
             true => 1.0 + dt * conduction / capacity(k),
             false => 1.0,
         });
-        Task {
+        LinearTask {
             size,
             length: longest / spacing,
             entries: self.system.rows.stored()[2],

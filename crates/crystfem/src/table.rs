@@ -48,7 +48,7 @@ type Read = fn(&Table, usize, Option<&str>) -> Result<Vec<f64>, table::Error>;
 
 /// A requested column.
 #[derive(Clone, Copy)]
-pub struct Column {
+pub struct TableColumn {
     name: &'static str,
     read: Read,
     example: &'static str,
@@ -57,9 +57,9 @@ pub struct Column {
     most: f64,
 }
 
-impl Column {
+impl TableColumn {
     /// Returns a column of quantities of dimension `D`.
-    pub fn of<D: Dimension>(name: &'static str) -> Self {
+    pub fn new<D: Dimension>(name: &'static str) -> Self {
         let (least, most) = (f64::NEG_INFINITY, f64::INFINITY);
         Self { name, read: Table::column::<D>, example: D::EXAMPLE, unit: None, least, most }
     }
@@ -83,7 +83,7 @@ impl Column {
 /// [`Error::File`] with line and column for a file that cannot be read, a missing or repeated column, a row
 /// of another length, a cell that is not a finite number of the column's dimension, a number out of range,
 /// and a table without rows.
-pub fn read<const N: usize>(path: &Path, columns: [Column; N]) -> Result<[Vec<f64>; N], Error> {
+pub fn read<const N: usize>(path: &Path, columns: [TableColumn; N]) -> Result<[Vec<f64>; N], Error> {
     read_with_lines(path, columns).map(|(data, _)| data)
 }
 
@@ -93,7 +93,7 @@ pub fn read<const N: usize>(path: &Path, columns: [Column; N]) -> Result<[Vec<f6
 /// Errors of [`read`].
 pub fn read_with_lines<const N: usize>(
     path: &Path,
-    columns: [Column; N],
+    columns: [TableColumn; N],
 ) -> Result<([Vec<f64>; N], Vec<usize>), Error> {
     let table = open(path)?;
     let mut data = [(); N].map(|()| Vec::new());
@@ -123,7 +123,7 @@ pub fn read_with_lines<const N: usize>(
 }
 
 /// Describes how a calorimeter table is interpreted, in one line; `None` for other files.
-pub fn understood(path: &Path) -> Option<String> {
+pub fn describe_format(path: &Path) -> Option<String> {
     let table = Table::read(path).ok()?;
     let used: Vec<usize> = NAMES.iter().flat_map(|(_, names)| table.matching(names)).collect();
     let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -157,9 +157,9 @@ mod tests {
         let path = folder.path().join("t.csv");
         std::fs::write(&path, text).unwrap();
         let columns = [
-            Column::of::<TimeDimension>("time"),
-            Column::of::<TemperatureDimension>("temperature"),
-            Column::of::<RatioDimension>("alpha").within(0.0, 1.0),
+            TableColumn::new::<TimeDimension>("time"),
+            TableColumn::new::<TemperatureDimension>("temperature"),
+            TableColumn::new::<RatioDimension>("alpha").within(0.0, 1.0),
         ];
         read(&path, columns).map_err(|error| error.to_string())
     }
@@ -192,7 +192,7 @@ mod tests {
             let error = of(text).unwrap_err();
             assert!(parts.iter().all(|part| error.contains(part)), "{error}");
         }
-        let columns = [Column::of::<TimeDimension>("time")];
+        let columns = [TableColumn::new::<TimeDimension>("time")];
         assert!(
             read(Path::new("/no/such.csv"), columns)
                 .unwrap_err()
@@ -229,16 +229,16 @@ mod tests {
             let path = folder.path().join("t.csv");
             std::fs::write(&path, bytes).unwrap();
             let columns = [
-                Column::of::<TimeDimension>("time"),
-                Column::of::<TemperatureDimension>("temperature"),
-                Column::of::<SpecificPowerDimension>("heat_flow"),
+                TableColumn::new::<TimeDimension>("time"),
+                TableColumn::new::<TemperatureDimension>("temperature"),
+                TableColumn::new::<SpecificPowerDimension>("heat_flow"),
             ];
             let [time, temperature, flow] =
                 read(&path, columns).unwrap_or_else(|error| panic!("{name}: {error}"));
             assert_eq!(time, [0.0, 6.0], "{name}");
             assert_eq!(temperature, [473.65, 472.65], "{name}");
             assert_eq!(flow, [50.0, 250.0], "{name}");
-            assert!(understood(&path).unwrap().starts_with("data t.csv: separat"), "{name}");
+            assert!(describe_format(&path).unwrap().starts_with("data t.csv: separat"), "{name}");
         }
     }
 }

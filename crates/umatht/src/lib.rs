@@ -23,7 +23,7 @@ mod host;
 pub use constants::{Error, NAMES};
 
 use constants::Constants;
-use crystfem::material::{Point, ThermalMaterial};
+use crystfem::material::{PointInput, ThermalMaterial};
 use nalgebra::Vector3;
 
 /// An increment at an integration point, in the units of the host: time in s, temperature from its own zero.
@@ -89,7 +89,7 @@ fn answer(constants: &Constants, at: &Increment, state: &State) -> Result<Answer
         }
     }
     let point =
-        Point { temperature: start, increment: end - start, gradient: at.gradient.into(), dt: at.time };
+        PointInput { temperature: start, increment: end - start, gradient: at.gradient.into(), dt: at.time };
     let (old, mut new) = ([state.z], [0.0]);
     let response = material.respond(&point, &old, &mut new)?;
     let mut fields = [0.0; 2];

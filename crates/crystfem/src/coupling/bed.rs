@@ -1,14 +1,14 @@
 //! Side of a part that lies on the bed: its nodes, its supports after release, its warpage.
 
 use crate::error::Error;
-use crate::mechanics::Support;
+use crate::mechanics::FixedComponent;
 use crate::mesh::Mesh;
-use crate::mesh::surface::Surface;
+use crate::mesh::surface::OuterSurface;
 use nalgebra::{Matrix3, Matrix3xX, Vector3};
 use std::collections::{HashMap, HashSet};
 
-/// Returns the bed nodes, ascending: nodes of bearing elements on a named surface ([`Surface::region`]), or
-/// by default those shared with other elements.
+/// Returns the bed nodes, ascending: nodes of bearing elements on a named surface ([`OuterSurface::region`]),
+/// or by default those shared with other elements.
 ///
 /// # Errors
 /// [`Error::Unknown`] for a name that the mesh lacks.
@@ -20,7 +20,7 @@ pub fn bed_nodes(mesh: &Mesh, bears: &[bool], surface: Option<&str>) -> Result<V
     let bearing = nodes_of(true);
     let mut bed: Vec<u32> = match surface {
         Some(name) => {
-            let surface = Surface::of_all(mesh)?;
+            let surface = OuterSurface::of_all(mesh)?;
             let faces = surface.all_in(&surface.region(mesh, name)?);
             let nodes = faces.iter().flat_map(|face| mesh.face_nodes(*face).to_vec());
             nodes.filter(|node| bearing.contains(node)).collect()
@@ -57,7 +57,7 @@ fn place(mesh: &Mesh, node: u32) -> Vector3<f64> {
 
 /// Supports 3, 2 and 1 components of three distant nodes of the bed: no rigid motion remains, and no reaction
 /// arises.
-pub(super) fn statically_determinate(mesh: &Mesh, bed: &[u32]) -> Vec<Support> {
+pub(super) fn statically_determinate(mesh: &Mesh, bed: &[u32]) -> Vec<FixedComponent> {
     let place = |node: u32| place(mesh, node);
     let farthest = |of: &dyn Fn(u32) -> f64| {
         bed.iter().copied().max_by(|&a, &b| of(a).total_cmp(&of(b)).then(b.cmp(&a))).unwrap_or(0)
@@ -68,7 +68,7 @@ pub(super) fn statically_determinate(mesh: &Mesh, bed: &[u32]) -> Vec<Support> {
     let third = farthest(&|node| (place(node) - place(first)).cross(&along).norm());
     let normal = along.cross(&(place(third) - place(first)));
     let (axis, upright) = (along.iamax(), normal.iamax());
-    let mut supports: Vec<Support> = (0..3).map(|d| (first, d)).collect();
+    let mut supports: Vec<FixedComponent> = (0..3).map(|d| (first, d)).collect();
     supports.extend((0..3).filter(|&d| d != axis).map(|d| (second, d)));
     supports.push((third, upright));
     supports

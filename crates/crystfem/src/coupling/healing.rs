@@ -3,13 +3,13 @@
 use crate::error::Error;
 use crate::healing::Healing;
 use crate::mesh::Mesh;
-use crate::mesh::surface::{Surface, area};
+use crate::mesh::surface::{OuterSurface, area};
 use crate::problem::Birth;
 use crate::simulation::Simulation;
 
 /// An interface between two elements.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Interface {
+pub struct HealingInterface {
     /// Newer and older element.
     pub sides: [u32; 2],
     /// Shared corners.
@@ -18,14 +18,14 @@ pub struct Interface {
     pub area: f64,
 }
 
-impl Interface {
+impl HealingInterface {
     /// Returns the interfaces between printed elements of different births; `birth_of` is the birth number of
     /// each element.
     ///
     /// # Errors
-    /// Errors of [`Surface::of_all`].
+    /// Errors of [`OuterSurface::of_all`].
     pub fn between_births(mesh: &Mesh, printed: &[bool], birth_of: &[u32]) -> Result<Vec<Self>, Error> {
-        let surface = Surface::of_all(mesh)?;
+        let surface = OuterSurface::of_all(mesh)?;
         let mut interfaces = Vec::new();
         for element in (0..mesh.element_count() as u32).filter(|&element| printed[element as usize]) {
             for face in mesh.faces_of(element) {
@@ -47,8 +47,8 @@ pub struct HealingSettings {
     pub law: Healing,
     /// Tensile strength of the material, Pa, if known; that of an interface is D_h times it.
     pub strength: Option<f64>,
-    /// Interfaces, see [`Interface::between_births`].
-    pub interfaces: Vec<Interface>,
+    /// Interfaces, see [`HealingInterface::between_births`].
+    pub interfaces: Vec<HealingInterface>,
     /// Elements printed of the healing material.
     pub printed: Vec<bool>,
 }
@@ -57,7 +57,7 @@ impl HealingSettings {
     /// Returns settings for all elements of one material, given by its index, with interfaces between births.
     ///
     /// # Errors
-    /// Errors of [`Interface::between_births`].
+    /// Errors of [`HealingInterface::between_births`].
     pub fn new(
         mesh: &Mesh,
         material_of: &[u16],
@@ -71,7 +71,7 @@ impl HealingSettings {
         }
         let births = birth_of.iter().zip(material_of);
         let printed: Vec<bool> = births.map(|(&birth, &of)| of == material && birth != u32::MAX).collect();
-        let interfaces = Interface::between_births(mesh, &printed, &birth_of)?;
+        let interfaces = HealingInterface::between_births(mesh, &printed, &birth_of)?;
         Ok(Self { law, strength: None, interfaces, printed })
     }
 }

@@ -9,5 +9,5 @@ mod healing;
 mod stress;
 
 pub use bed::{bed_nodes, loose_elements};
-pub use healing::{HealingCoupling, HealingSettings, HealingState, Interface};
+pub use healing::{HealingCoupling, HealingInterface, HealingSettings, HealingState};
 pub use stress::{STRAIN_STEP, StressCoupling, StressSettings, StressState};

@@ -2,7 +2,9 @@
 
 use super::bed::{bed_nodes, loose_elements, out_of_flatness, remove_rigid_motion, statically_determinate};
 use crate::error::Error;
-use crate::mechanics::{Body, BodyState, EnergyBalance, MOST, SolidifyingMaxwell, Support, points, shares};
+use crate::mechanics::{
+    Body, BodyState, EnergyBalance, FIRST_ORDER_NODES, FixedComponent, SolidifyingMaxwell, points, shares,
+};
 use crate::mesh::Mesh;
 use crate::simulation::Simulation;
 use polycore::tensor::von_mises;
@@ -49,9 +51,9 @@ impl StressSettings {
 
 /// State of an element at the last solution.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-struct Thermal {
+struct ElementThermalState {
     /// Temperatures of the nodes, K.
-    nodes: [f64; MOST],
+    nodes: [f64; FIRST_ORDER_NODES],
     /// Number of nodes.
     count: usize,
     /// α.
@@ -64,7 +66,7 @@ struct Thermal {
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct StressState {
     body: BodyState,
-    last: Vec<Option<Thermal>>,
+    last: Vec<Option<ElementThermalState>>,
     solutions: u64,
     mises_on_bed: f64,
 }
@@ -143,12 +145,17 @@ impl<'a> StressCoupling<'a> {
         let time = simulation.time();
         let degrees = simulation.element_means("alpha");
         let births = &simulation.problem().births;
-        let now = |element: usize| -> Option<Thermal> {
-            let (mut nodes, own) = ([0.0; MOST], self.mesh.nodes(element as u32));
+        let now = |element: usize| -> Option<ElementThermalState> {
+            let (mut nodes, own) = ([0.0; FIRST_ORDER_NODES], self.mesh.nodes(element as u32));
             for (value, &node) in nodes.iter_mut().zip(own) {
                 *value = simulation.temperature(node)?;
             }
-            Some(Thermal { nodes, count: own.len(), degree: degrees[element].unwrap_or(0.0), time })
+            Some(ElementThermalState {
+                nodes,
+                count: own.len(),
+                degree: degrees[element].unwrap_or(0.0),
+                time,
+            })
         };
         let StressSettings { law, bears, .. } = &self.settings;
         let mut present = vec![None; bears.len()];
@@ -162,8 +169,8 @@ impl<'a> StressCoupling<'a> {
                 // birth temperature: the exchange with neighbours at birth is part of the strain
                 let birth = (simulation.state().born[element] as usize).checked_sub(1);
                 self.state.last[element] = match birth.and_then(|birth| births.get(birth)) {
-                    Some(birth) => Some(Thermal {
-                        nodes: [birth.temperature; MOST],
+                    Some(birth) => Some(ElementThermalState {
+                        nodes: [birth.temperature; FIRST_ORDER_NODES],
                         count: self.mesh.nodes(element as u32).len(),
                         degree: self.settings.initial_alpha,
                         time: birth.time,
@@ -184,7 +191,8 @@ impl<'a> StressCoupling<'a> {
         let about = births.get(simulation.state().births).is_some_and(|birth| birth.time <= time);
         if must || about || change > self.settings.strain_step {
             let bed = self.settings.bed.iter();
-            let supports: Vec<Support> = bed.flat_map(|&node| (0..3).map(move |d| (node, d))).collect();
+            let supports: Vec<FixedComponent> =
+                bed.flat_map(|&node| (0..3).map(move |d| (node, d))).collect();
             self.solve(&present, &supports)?;
             self.state.last = present;
         }
@@ -192,7 +200,11 @@ impl<'a> StressCoupling<'a> {
     }
 
     /// Solves for the step from the last states of elements to the present ones.
-    fn solve(&mut self, present: &[Option<Thermal>], supports: &[Support]) -> Result<(), Error> {
+    fn solve(
+        &mut self,
+        present: &[Option<ElementThermalState>],
+        supports: &[FixedComponent],
+    ) -> Result<(), Error> {
         let (law, last) = (&self.settings.law, &self.state.last);
         if last.iter().all(Option::is_none) {
             return Ok(());
@@ -209,7 +221,10 @@ impl<'a> StressCoupling<'a> {
             },
             |element, point, _| {
                 let Some((before, after)) = pair(element) else { return 0.0 };
-                law.volume.strain([before.at(point), before.degree], [after.at(point), after.degree])
+                law.volume.strain(
+                    [before.temperature_at(point), before.degree],
+                    [after.temperature_at(point), after.degree],
+                )
             },
             supports,
         )?;
@@ -307,7 +322,7 @@ impl<'a> StressCoupling<'a> {
     }
 }
 
-impl Thermal {
+impl ElementThermalState {
     /// Returns mean T, K, and α.
     fn mean(&self) -> [f64; 2] {
         // corners of first order have equal shares
@@ -315,11 +330,11 @@ impl Thermal {
             return [self.nodes[..self.count].iter().sum::<f64>() / self.count as f64, self.degree];
         }
         let points = points(self.count);
-        [(0..points).map(|point| self.at(point)).sum::<f64>() / points as f64, self.degree]
+        [(0..points).map(|point| self.temperature_at(point)).sum::<f64>() / points as f64, self.degree]
     }
 
     /// Returns T at a Gauss point, K.
-    fn at(&self, point: usize) -> f64 {
+    fn temperature_at(&self, point: usize) -> f64 {
         let shares = shares(self.count, point);
         shares[..self.count].iter().zip(self.nodes).map(|(share, t)| share * t).sum()
     }

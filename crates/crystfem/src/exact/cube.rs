@@ -9,7 +9,7 @@
 //! in space.
 
 use crate::boundary::{Condition, Field};
-use crate::material::{Conductor, Property};
+use crate::material::{Conductor, ThermalProperty};
 use crate::mesh::Grid;
 use crate::problem::Problem;
 use crate::simulation::Simulation;
@@ -34,7 +34,7 @@ pub const END: f64 = 266.64;
 
 /// Initial temperature of the cube.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Start {
+pub enum CubeStart {
     /// Slowest eigenvector.
     Smooth,
     /// Uniform, with a jump at the held faces.
@@ -44,12 +44,12 @@ pub enum Start {
 /// A cube of N³ elements.
 pub struct Cube {
     elements: usize,
-    start: Start,
+    start: CubeStart,
 }
 
 impl Cube {
     /// Returns a cube with `elements` along an edge.
-    pub fn new(elements: usize, start: Start) -> Self {
+    pub fn new(elements: usize, start: CubeStart) -> Self {
         Self { elements, start }
     }
 
@@ -61,7 +61,7 @@ impl Cube {
     /// Returns the finite-element problem.
     pub fn problem(&self) -> Result<Problem, crate::Error> {
         let mesh = Grid::uniform([0.0; 3], [EDGE; 3], [self.elements; 3])?.mesh("cube")?;
-        let property = Property::constant;
+        let property = ThermalProperty::constant;
         let (k, c) = (property("k", CONDUCTIVITY)?, property("c", SPECIFIC_HEAT)?);
         let mut nodes: Vec<u32> =
             ["left", "front", "bottom"].iter().flat_map(|side| mesh.node_sets[*side].clone()).collect();
@@ -71,8 +71,8 @@ impl Cube {
         let material = Arc::new(Conductor::new(DENSITY, k, c)?);
         let (start, sine) = (self.start, |x: f64| (0.5 * PI * x / EDGE).sin());
         let initial = Field::function(move |place, _| match start {
-            Start::Smooth => COLD + (HOT - COLD) * place.map(sine).iter().product::<f64>(),
-            Start::Quenched => HOT,
+            CubeStart::Smooth => COLD + (HOT - COLD) * place.map(sine).iter().product::<f64>(),
+            CubeStart::Quenched => HOT,
         });
         Ok(Problem { conditions, initial, ..Problem::new(mesh, material, HOT) })
     }
@@ -84,8 +84,8 @@ impl Cube {
         let sine = |mode: usize, node: usize| (angle(mode) * node as f64).sin();
         // expansion of the temperature 1 at all free nodes; the last has half a cell
         let coefficient = |mode: usize| match self.start {
-            Start::Smooth => f64::from(u8::from(mode == 0)),
-            Start::Quenched => {
+            CubeStart::Smooth => f64::from(u8::from(mode == 0)),
+            CubeStart::Quenched => {
                 let weight = |node: usize| if node == count { 0.5 } else { 1.0 };
                 2.0 / count as f64 * (1..=count).map(|node| weight(node) * sine(mode, node)).sum::<f64>()
             }
@@ -138,19 +138,19 @@ mod tests {
     /// The initial state is reproduced; many elements approach the product of three walls with held faces
     /// (Carslaw & Jaeger).
     #[test]
-    fn the_closed_form() {
-        for start in [Start::Smooth, Start::Quenched] {
+    fn closed_form_of_start_and_decay() {
+        for start in [CubeStart::Smooth, CubeStart::Quenched] {
             let cube = Cube::new(5, start);
             let problem = cube.problem().unwrap();
             for (place, exact) in problem.mesh.points.iter().zip(cube.exact(|_| 1.0)) {
                 let held = place.contains(&0.0);
-                let expected = if held { COLD } else { problem.initial.at(*place, 0.0) };
+                let expected = if held { COLD } else { problem.initial.value_at(*place, 0.0) };
                 // rounding of sums of 5³ modes of 140 K
                 assert!((exact - expected).abs() < 1e-11, "{place:?}: {exact}, {expected}");
             }
         }
         let errors = [8, 16].map(|elements| {
-            let cube = Cube::new(elements, Start::Quenched);
+            let cube = Cube::new(elements, CubeStart::Quenched);
             let exact = cube.exact(|lambda| (-lambda * END).exp());
             let fourier = CONDUCTIVITY / (DENSITY * SPECIFIC_HEAT) * END / (EDGE * EDGE);
             let wall = Wall { biot: f64::INFINITY }.share(0.0, fourier);
@@ -163,7 +163,7 @@ mod tests {
     /// Finite elements step like their eigenvectors.
     #[test]
     fn backward_euler_is_a_product() {
-        let cube = Cube::new(4, Start::Quenched);
+        let cube = Cube::new(4, CubeStart::Quenched);
         let settings = crate::simulation::Settings {
             tolerance: 1e-9,
             ..crate::simulation::Settings::backward_euler(10.0)

@@ -14,7 +14,7 @@ mod wall;
 pub use benchmark::{CooledPlate, SwingingSlab, radiating_rod};
 pub use cooling::{adiabatic_rise, lumped_film, lumped_radiation};
 pub use front::{Freezing, stefan_root};
-pub use half_space::{Contact, HalfSpace};
+pub use half_space::{HalfSpace, HalfSpaceContact};
 pub use manufactured::Manufactured;
 pub use wall::{Wall, steady_wall};
 

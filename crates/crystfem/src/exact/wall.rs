@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn both_forms_meet() {
+    fn both_forms_agree_at_their_border() {
         for biot in [1e-6, 1e-3, 0.1, 1.0, 10.0, 1e3, 1e6, f64::INFINITY] {
             for place in [0.0, 0.3, 0.9, 1.0] {
                 let wall = Wall { biot };

@@ -1,7 +1,7 @@
 //! Avrami's law of isothermal crystallization.
 
 use super::least_squares::{STEP, minimize};
-use super::{Estimate, Fit, check, check_finite};
+use super::{Estimate, KineticFit, check, check_finite};
 use crate::error::Error;
 use crate::kinetics;
 use std::f64::consts::LN_2;
@@ -13,7 +13,7 @@ use std::f64::consts::LN_2;
 /// # Errors
 /// [`Error::Data`] for columns of different lengths, negative times, α outside [`super::DEGREES`], NaN, too
 /// few or constant measurements, and data that do not determine both constants.
-pub fn avrami(times: &[f64], degrees: &[f64]) -> Result<Fit, Error> {
+pub fn avrami(times: &[f64], degrees: &[f64]) -> Result<KineticFit, Error> {
     let what = "fit of Avrami's law";
     if times.len() != degrees.len() {
         let reason = format!("{} times and {} values of alpha", times.len(), degrees.len());
@@ -47,7 +47,7 @@ pub fn avrami(times: &[f64], degrees: &[f64]) -> Result<Fit, Error> {
     let estimate = |name, unit: &str, value: f64, gradient: [f64; 2]| {
         Estimate::of_logarithm(name, unit, value, minimum.error_of(&gradient), minimum.degrees)
     };
-    Ok(Fit {
+    Ok(KineticFit {
         estimates: vec![
             estimate("half_time", "s", half, [1.0, 0.0]),
             estimate("avrami_exponent", "", exponent, [0.0, 1.0]),

@@ -28,7 +28,7 @@ const ITERATIONS: usize = 200;
 /// Change of α at which the iteration ends.
 const CONVERGED: f64 = 1e-12;
 /// Smallest peak area over the integral of |q|; smaller ones are rounding errors.
-const LEAST_AREA: f64 = 1e-10;
+const MIN_AREA: f64 = 1e-10;
 
 /// A peak of heat flow between two limits.
 #[derive(Clone, Debug, PartialEq)]
@@ -54,7 +54,12 @@ impl Peak {
     /// [`Error::Data`] for columns of different lengths, numbers that are not finite, times that decrease,
     /// limits that are not in order within the times, too few rows for a tangent, and a baseline that does
     /// not converge; [`Error::Parameter`] for an enthalpy that is not above 0.
-    pub fn of(times: &[f64], flows: &[f64], limits: [f64; 2], baseline: Baseline) -> Result<Self, Error> {
+    pub fn integrate(
+        times: &[f64],
+        flows: &[f64],
+        limits: [f64; 2],
+        baseline: Baseline,
+    ) -> Result<Self, Error> {
         let what = "integration of a heat flow";
         let refuse = |reason: String| Error::Data { what: what.to_owned(), reason };
         if times.len() != flows.len() || times.len() < 2 {
@@ -75,7 +80,7 @@ impl Peak {
         }
         let inside: Vec<usize> =
             (0..times.len()).filter(|&row| times[row] > from && times[row] < to).collect();
-        let [start, end] = limits.map(|limit| at(times, flows, limit));
+        let [start, end] = limits.map(|limit| interpolate(times, flows, limit));
         let cut = |start: f64, values: &[f64], end: f64| {
             let between = inside.iter().map(|&row| values[row]);
             std::iter::once(start).chain(between).chain(std::iter::once(end)).collect::<Vec<f64>>()
@@ -114,7 +119,7 @@ impl Peak {
         };
         peak.degrees = peak.times.iter().map(|time| (time - from) / (to - from)).collect();
         for _ in 0..ITERATIONS {
-            let change = peak.integrate(limits, lines)?;
+            let change = peak.iterate(limits, lines)?;
             // both lines coincide: B does not depend on α
             if baseline == Baseline::Linear || change < CONVERGED {
                 return Ok(peak);
@@ -127,7 +132,7 @@ impl Peak {
     }
 
     /// Updates the baseline from α, then α; returns the largest change of α.
-    fn integrate(&mut self, limits: [f64; 2], lines: [[f64; 2]; 2]) -> Result<f64, Error> {
+    fn iterate(&mut self, limits: [f64; 2], lines: [[f64; 2]; 2]) -> Result<f64, Error> {
         let on = |side: usize, time: f64| lines[side][0] + lines[side][1] * (time - limits[side]);
         let rows = self.times.iter().zip(&self.degrees);
         self.baseline = rows.map(|(&t, degree)| (1.0 - degree) * on(0, t) + degree * on(1, t)).collect();
@@ -139,7 +144,7 @@ impl Peak {
             size += half * (self.flows[row - 1].abs() + self.flows[row].abs());
             sums.push(sum);
         }
-        if !(sum > LEAST_AREA * size && sum.is_finite()) {
+        if !(sum > MIN_AREA * size && sum.is_finite()) {
             let allowed = "above 0: a peak of heat given off over its baseline. Crystallization is \
                 exothermal; is `exothermal` the wrong way round, or is the peak outside the limits?";
             return Err(Error::Parameter { name: "enthalpy in J/kg", found: sum, allowed: allowed.into() });
@@ -155,7 +160,7 @@ impl Peak {
 }
 
 /// Interpolates a column at a time within sorted times.
-pub fn at(times: &[f64], values: &[f64], time: f64) -> f64 {
+pub fn interpolate(times: &[f64], values: &[f64], time: f64) -> f64 {
     let after = times.partition_point(|&t| t < time).clamp(1, times.len() - 1);
     let [a, b] = [times[after - 1], times[after]];
     let share = if b > a { (time - a) / (b - a) } else { 1.0 };
@@ -215,7 +220,7 @@ mod tests {
     fn a_whole_peak_on_a_slope() {
         let of = |steps: usize| {
             let (times, flows) = curve(steps, |t| 700.0 + 3.0 * t);
-            errors(&Peak::of(&times, &flows, [-30.0, 240.0], Baseline::Linear).unwrap(), avrami, HEAT)
+            errors(&Peak::integrate(&times, &flows, [-30.0, 240.0], Baseline::Linear).unwrap(), avrami, HEAT)
         };
         let found = [of(216), of(432), of(864)];
         for order in orders(&found) {
@@ -237,7 +242,7 @@ mod tests {
         };
         let of = |steps: usize| {
             let (times, flows) = curve(steps, |t| -200.0 - 1.5 * t);
-            let peak = Peak::of(&times, &flows, [a, b], Baseline::Linear).unwrap();
+            let peak = Peak::integrate(&times, &flows, [a, b], Baseline::Linear).unwrap();
             assert_eq!((peak.degrees[0], *peak.degrees.last().unwrap()), (0.0, 1.0));
             errors(&peak, |t| area(t) / area(b), area(b))
         };
@@ -259,7 +264,7 @@ mod tests {
                 };
                 let (times, flows) = curve(steps, truth);
                 // tangents reach a tenth of the width beyond: −19 to 0 s and 190 to 209 s
-                errors(&Peak::of(&times, &flows, [0.0, 190.0], baseline).unwrap(), avrami, HEAT)
+                errors(&Peak::integrate(&times, &flows, [0.0, 190.0], baseline).unwrap(), avrami, HEAT)
             };
             let found = [of(270, baseline), of(540, baseline), of(1080, baseline)];
             for order in orders(&found) {
@@ -272,10 +277,10 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_integrated() {
+    fn invalid_integrations_are_refused() {
         let (times, flows) = curve(270, |t| 700.0 + 3.0 * t);
         let of = |times: &[f64], flows: &[f64], limits, baseline| {
-            Peak::of(times, flows, limits, baseline).unwrap_err().to_string()
+            Peak::integrate(times, flows, limits, baseline).unwrap_err().to_string()
         };
         use Baseline::{Linear, Sigmoidal, Tangential};
         let whole = [-30.0, 240.0];

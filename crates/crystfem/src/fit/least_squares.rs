@@ -10,11 +10,11 @@ use std::cell::Cell;
 pub type Residuals<'a> = dyn Fn(&[f64]) -> Option<Vec<f64>> + 'a;
 
 /// Residual of rejected trial points: no step to them is accepted.
-const REJECTED: f64 = 1e100;
+const REJECTED_RESIDUAL: f64 = 1e100;
 
 /// Smallest relative eigenvalue of the normal matrix, with its columns scaled to 1, at which the parameters
 /// count as determined: differences have errors of 1e-10, which the matrix squares with the condition.
-const COLLINEAR: f64 = 1e-12;
+const MIN_EIGENVALUE: f64 = 1e-12;
 
 /// Relative difference step for residuals exact to rounding: ∛ε, good to 1e-10.
 pub const STEP: f64 = 6e-6;
@@ -70,13 +70,13 @@ pub fn minimize(
     let trial = |at: &DVector<f64>| {
         evaluations.set(evaluations.get() + 1);
         // a trial outside the domain must be rejected; `None` would end the search
-        Some(DVector::from_vec(residuals(at.as_slice()).unwrap_or_else(|| vec![REJECTED; count])))
+        Some(DVector::from_vec(residuals(at.as_slice()).unwrap_or_else(|| vec![REJECTED_RESIDUAL; count])))
     };
     for start in starts {
         let at = DVector::from_row_slice(start);
         let Found { at, objective } = levenberg_marquardt(at, 200, trial, |at| jacobian(residuals, at, step));
         let better = best.as_ref().is_none_or(|(least, _)| objective < *least);
-        if objective < REJECTED && better && residuals(at.as_slice()).is_some() {
+        if objective < REJECTED_RESIDUAL && better && residuals(at.as_slice()).is_some() {
             best = Some((objective, at));
         }
     }
@@ -91,7 +91,7 @@ pub fn minimize(
     }
     let scaled = DMatrix::from_fn(count, at.len(), |row, column| jacobian[(row, column)] / norms[column]);
     let normal = scaled.tr_mul(&scaled);
-    if normal.clone().symmetric_eigenvalues().min() < COLLINEAR {
+    if normal.clone().symmetric_eigenvalues().min() < MIN_EIGENVALUE {
         return Err(refuse(undetermined));
     }
     let inverse = normal.cholesky().ok_or_else(|| refuse(undetermined))?.inverse();

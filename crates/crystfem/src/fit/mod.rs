@@ -10,10 +10,10 @@ mod student;
 mod thermogram;
 
 pub use avrami::avrami;
-pub use heat_flow::{Baseline, Peak, at};
-pub use nakamura::{Known, Run, nakamura};
+pub use heat_flow::{Baseline, Peak, interpolate};
+pub use nakamura::{FixedConstants, Run, nakamura};
 pub use ozawa::{Cooling, ozawa, rates_at};
-pub use part::part;
+pub use part::fit_in_part;
 pub use student::quantile;
 pub use thermogram::{MeasuredPeak, Thermogram};
 
@@ -21,7 +21,7 @@ use crate::error::Error;
 
 /// A fitted law.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Fit {
+pub struct KineticFit {
     /// Fitted constants.
     pub estimates: Vec<Estimate>,
     /// Draws of all constants from their posterior ([`polycore::posterior`]).
@@ -51,7 +51,7 @@ pub struct Estimate {
     pub interval: [f64; 2],
 }
 
-impl Fit {
+impl KineticFit {
     /// Returns an estimate by name.
     pub fn get(&self, name: &str) -> Option<&Estimate> {
         self.estimates.iter().find(|estimate| estimate.name == name)

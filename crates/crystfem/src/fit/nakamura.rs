@@ -1,17 +1,17 @@
 //! Nakamura's theory with the rate of Hoffman and Lauritzen, fitted to any temperature histories.
 
 use super::least_squares::{STEP, minimize};
-use super::{Estimate, Fit, check, check_finite};
+use super::{Estimate, KineticFit, check, check_finite};
 use crate::error::Error;
-use crate::kinetics::{Constants, GAS_CONSTANT, Kinetics};
+use crate::kinetics::{GAS_CONSTANT, KineticConstants, Kinetics};
 use std::f64::consts::LN_2;
 
 /// Temperature step, K, for the integration of K: the error in α is below 1e-7.
-const PART: f64 = 1.0;
+const INTEGRATION_STEP: f64 = 1.0;
 
 /// Constants that are not fitted.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Known {
+pub struct FixedConstants {
     /// Equilibrium melting temperature T₀, K.
     pub equilibrium_melting: f64,
     /// Temperature T∞ of frozen chains, K.
@@ -42,7 +42,7 @@ impl Run {
         rate: f64,
         temperatures: Vec<f64>,
         degrees: Vec<f64>,
-        known: &Known,
+        known: &FixedConstants,
     ) -> Result<Self, Error> {
         let refuse = |reason: String| Err(Error::Data { what: "cooling curve".to_owned(), reason });
         if !(rate > 0.0 && rate.is_finite()) {
@@ -69,7 +69,7 @@ impl Run {
         let mut z = 0.0;
         let mut found: Vec<f64> = if self.history.is_empty() { vec![z] } else { Vec::new() };
         let later = all.map(|[next, end]| {
-            let parts = ((end - temperature).abs() / PART).ceil().clamp(1.0, 1000.0);
+            let parts = ((end - temperature).abs() / INTEGRATION_STEP).ceil().clamp(1.0, 1000.0);
             for part in 0..parts as usize {
                 let [a, b] = [part, part + 1].map(|k| temperature + (end - temperature) * (k as f64 / parts));
                 z += kinetics.growth(a, b, (next - time) / parts).z;
@@ -118,7 +118,7 @@ impl Run {
 /// # Errors
 /// [`Error::Data`] as for [`avrami`](super::avrami), for times that decrease, and data that do not determine
 /// all three (one isothermal run, for example); [`Error::Parameter`] for known constants out of their domain.
-pub fn nakamura(runs: &[Run], known: &Known) -> Result<Fit, Error> {
+pub fn nakamura(runs: &[Run], known: &FixedConstants) -> Result<KineticFit, Error> {
     let what = "fit of Nakamura's and Hoffman–Lauritzen's constants";
     for run in runs {
         run.check(what)?;
@@ -126,7 +126,7 @@ pub fn nakamura(runs: &[Run], known: &Known) -> Result<Fit, Error> {
     let degrees: Vec<f64> = runs.iter().flat_map(|run| run.degrees.iter().copied()).collect();
     check(what, &degrees, 3)?;
     let of = |growth_rate: f64, nucleation: f64, avrami_exponent: f64| {
-        Kinetics::new(Constants {
+        Kinetics::new(KineticConstants {
             growth_rate,
             nucleation,
             activation_energy: known.activation_energy,
@@ -177,7 +177,7 @@ pub fn nakamura(runs: &[Run], known: &Known) -> Result<Fit, Error> {
     let estimate = |name, unit: &str, value: f64, gradient: [f64; 3]| {
         Estimate::of_logarithm(name, unit, value, minimum.error_of(&gradient), minimum.degrees)
     };
-    Ok(Fit {
+    Ok(KineticFit {
         estimates: vec![
             estimate("growth_rate", "1/s", logarithm(q), gradient),
             estimate("nucleation", "K^2", q[1], [0.0, 1.0, 0.0]),
@@ -192,7 +192,7 @@ pub fn nakamura(runs: &[Run], known: &Known) -> Result<Fit, Error> {
 }
 
 /// Returns the mean temperature of measurements with 0.01 ≤ α ≤ 0.99 between T∞ and T₀.
-fn middle(runs: &[Run], known: &Known) -> Option<f64> {
+fn middle(runs: &[Run], known: &FixedConstants) -> Option<f64> {
     let (mut sum, mut count) = (0.0, 0.0);
     for run in runs {
         for (&temperature, &degree) in run.temperatures.iter().zip(&run.degrees) {

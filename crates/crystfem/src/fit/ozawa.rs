@@ -1,7 +1,7 @@
 //! Ozawa's law of crystallization at constant cooling rates.
 
 use super::least_squares::{STEP, minimize};
-use super::{Estimate, Fit, check, check_finite};
+use super::{Estimate, KineticFit, check, check_finite};
 use crate::error::Error;
 
 /// α over temperature at a constant cooling rate.
@@ -17,7 +17,7 @@ pub struct Cooling {
 
 impl Cooling {
     /// Interpolates α at a temperature; `None` outside the measurements.
-    fn at(&self, temperature: f64) -> Option<f64> {
+    fn degree_at(&self, temperature: f64) -> Option<f64> {
         (1..self.temperatures.len()).find_map(|i| {
             let [above, below] = [self.temperatures[i - 1], self.temperatures[i]];
             let within = below <= temperature && temperature <= above;
@@ -30,7 +30,7 @@ impl Cooling {
 /// Returns the rates, K/s, of the curves with 0.01 ≤ α ≤ 0.99 at a temperature, and α there.
 pub fn rates_at(coolings: &[Cooling], temperature: f64) -> (Vec<f64>, Vec<f64>) {
     let found = |cooling: &Cooling| {
-        let degree = cooling.at(temperature).filter(|a| (0.01..=0.99).contains(a))?;
+        let degree = cooling.degree_at(temperature).filter(|a| (0.01..=0.99).contains(a))?;
         Some((cooling.rate, degree))
     };
     coolings.iter().filter_map(found).unzip()
@@ -44,7 +44,7 @@ pub fn rates_at(coolings: &[Cooling], temperature: f64) -> (Vec<f64>, Vec<f64>) 
 /// # Errors
 /// [`Error::Data`] for rates that are not above 0, fewer than three rates with 0.01 ≤ α ≤ 0.99 at this
 /// temperature, and data that do not determine both constants.
-pub fn ozawa(coolings: &[Cooling], temperature: f64) -> Result<Fit, Error> {
+pub fn ozawa(coolings: &[Cooling], temperature: f64) -> Result<KineticFit, Error> {
     let what = format!("fit of Ozawa's law at {temperature} K ({:.2} degC)", temperature - 273.15);
     let refuse = |reason: String| Error::Data { what: what.clone(), reason };
     for cooling in coolings {
@@ -104,7 +104,7 @@ pub fn ozawa(coolings: &[Cooling], temperature: f64) -> Result<Fit, Error> {
             minimum.degrees,
         ),
     ];
-    Ok(Fit {
+    Ok(KineticFit {
         estimates,
         draws: minimum.draws(|p| vec![p[0], (p[1] + p[0] * middle).exp()]),
         rms: minimum.rms(),

@@ -1,15 +1,15 @@
 //! Fit of kinetic constants to curves measured in a part; the model is a whole simulation.
 
 use super::least_squares::minimize;
-use super::{Estimate, Fit, check};
+use super::{Estimate, KineticFit, check};
 use crate::error::Error;
-use crate::kinetics::{Constants, GAS_CONSTANT};
+use crate::kinetics::{GAS_CONSTANT, KineticConstants};
 
 /// Difference step of ln K and ln K_G: well above the effect of adaptive time steps on α.
 const STEP: f64 = 1e-3;
 
 /// Temperature, K, and α at each measurement for given constants; `None` if a simulation fails.
-pub type Model<'a> = dyn Fn(&Constants) -> Option<Vec<[f64; 2]>> + 'a;
+pub type Model<'a> = dyn Fn(&KineticConstants) -> Option<Vec<[f64; 2]>> + 'a;
 
 /// Fits K₀ and K_G of Eqs (4.6) and (4.7), starting from `start`; its other constants are kept.
 ///
@@ -18,7 +18,7 @@ pub type Model<'a> = dyn Fn(&Constants) -> Option<Vec<[f64; 2]>> + 'a;
 /// # Errors
 /// [`Error::Data`] as for [`avrami`](super::avrami), for a model that fails or does not crystallize at
 /// `start`, and curves that do not determine both constants (of a single temperature, for example).
-pub fn part(model: &Model, degrees: &[f64], start: &Constants) -> Result<Fit, Error> {
+pub fn fit_in_part(model: &Model, degrees: &[f64], start: &KineticConstants) -> Result<KineticFit, Error> {
     let what = "fit of a part";
     let refuse = |reason: &str| Error::Data { what: what.to_owned(), reason: reason.to_owned() };
     check(what, degrees, 2)?;
@@ -42,7 +42,7 @@ pub fn part(model: &Model, degrees: &[f64], start: &Constants) -> Result<Fit, Er
     let jump = start.activation_energy / (GAS_CONSTANT * (middle - start.frozen));
     let logarithm = |q: &[f64]| q[0] + jump + q[1].exp() * barrier;
     let constants =
-        |q: &[f64]| Constants { growth_rate: logarithm(q).exp(), nucleation: q[1].exp(), ..*start };
+        |q: &[f64]| KineticConstants { growth_rate: logarithm(q).exp(), nucleation: q[1].exp(), ..*start };
     let residuals = |q: &[f64]| -> Option<Vec<f64>> {
         let found = model(&constants(q))?;
         Some(found.iter().zip(degrees).map(|(row, data)| row[1] - data).collect())
@@ -53,7 +53,7 @@ pub fn part(model: &Model, degrees: &[f64], start: &Constants) -> Result<Fit, Er
     let estimate = |name, unit: &str, value: f64, gradient: [f64; 2]| {
         Estimate::of_logarithm(name, unit, value, minimum.error_of(&gradient), minimum.degrees)
     };
-    Ok(Fit {
+    Ok(KineticFit {
         estimates: vec![
             estimate("growth_rate", "1/s", logarithm(q), [1.0, q[1].exp() * barrier]),
             estimate("nucleation", "K^2", q[1], [0.0, 1.0]),

@@ -40,10 +40,10 @@ impl Thermogram {
     /// K.
     ///
     /// # Errors
-    /// Errors of [`Peak::of`].
+    /// Errors of [`Peak::integrate`].
     pub fn peak(&self, limits: [f64; 2], baseline: Baseline, melting: f64) -> Result<MeasuredPeak, Error> {
-        let peak = Peak::of(&self.times, &self.flows, limits, baseline)?;
-        let along = |time: &f64| at(&self.times, &self.temperatures, *time);
+        let peak = Peak::integrate(&self.times, &self.flows, limits, baseline)?;
+        let along = |time: &f64| interpolate(&self.times, &self.temperatures, *time);
         let temperatures = match self.temperatures.is_empty() {
             true => Vec::new(),
             false => peak.times.iter().map(along).collect(),

@@ -1,6 +1,6 @@
 //! Increment Δz = ∫K(T(t)) dt for a temperature linear in time, with its derivative.
 
-use super::{Constants, Kinetics, LARGEST_Z};
+use super::{KineticConstants, Kinetics, LARGEST_Z};
 use crate::simd_math::exp;
 
 /// Number of panels that divide (T∞, T₀); an increment is integrated panel by panel. The error in α for one
@@ -9,7 +9,7 @@ pub const PANELS: usize = 32;
 
 /// Largest increment, in panels, that is integrated in one piece across a border: K is smooth, and the error
 /// of the rule is below 1e-13.
-const WHOLE: f64 = 0.01;
+const MAX_SINGLE_PIECE: f64 = 0.01;
 
 /// Δz and ∂Δz/∂T at the end of the increment, at fixed Δt.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -39,7 +39,7 @@ impl Kinetics {
     }
 
     /// Computes Δz over one panel.
-    pub fn growth_over(&self, panel: &Panel, dt: f64) -> Growth {
+    pub fn growth_over(&self, panel: &TemperaturePanel, dt: f64) -> Growth {
         let half = 0.5 * panel.share * dt;
         if !panel.inside || half == 0.0 {
             return Growth::default();
@@ -78,7 +78,7 @@ impl Kinetics {
             // on heating, or otherwise
             let count = if change > 0.0 { counts[1] } else { counts[0] };
             let width = (high - low) / count;
-            let whole = change.abs() <= WHOLE * width;
+            let whole = change.abs() <= MAX_SINGLE_PIECE * width;
             let single = whole || panel(start[k], low, width, count) == panel(end[k], low, width, count);
             let (middle, reach) = (0.5 * (start[k] + end[k]), 0.5 * change * NODE);
             let sum = self.rate_of_all(middle - reach) + self.rate_of_all(middle + reach);
@@ -102,7 +102,7 @@ impl Kinetics {
     /// [`Self::rate`] without branches.
     #[inline(always)]
     fn rate_of_all(&self, temperature: f64) -> f64 {
-        let Constants { nucleation, equilibrium_melting, frozen, .. } = self.constants;
+        let KineticConstants { nucleation, equilibrium_melting, frozen, .. } = self.constants;
         let (above, below) = (temperature - frozen, equilibrium_melting - temperature);
         let barrier = 2.0 * temperature * temperature * below;
         let exponent = nucleation * (temperature + equilibrium_melting) * above;
@@ -123,7 +123,7 @@ const NODE: f64 = 0.577_350_269_189_625_8;
 
 /// A part of an increment within one panel, or outside (T∞, T₀).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Panel {
+pub struct TemperaturePanel {
     /// Temperature at its start, K.
     pub start: f64,
     /// Temperature at its end, K.
@@ -138,7 +138,7 @@ pub struct Panel {
     share_slope: f64,
 }
 
-impl Panel {
+impl TemperaturePanel {
     /// Fraction of the time increment.
     pub(crate) fn share(&self) -> f64 {
         if self.inside { self.share } else { 0.0 }
@@ -164,7 +164,7 @@ impl Panels {
     pub fn new(kinetics: &Kinetics, start: f64, end: f64, count: usize) -> Self {
         let (low, high) = (kinetics.constants.frozen, kinetics.constants.equilibrium_melting);
         let width = (high - low) / count as f64;
-        let whole = (end - start).abs() <= WHOLE * width;
+        let whole = (end - start).abs() <= MAX_SINGLE_PIECE * width;
         Self { start, end, at: start, low, width, count: count as f64, whole, done: false }
     }
 
@@ -184,9 +184,9 @@ impl Panels {
 }
 
 impl Iterator for Panels {
-    type Item = Panel;
+    type Item = TemperaturePanel;
 
-    fn next(&mut self) -> Option<Panel> {
+    fn next(&mut self) -> Option<TemperaturePanel> {
         if self.done {
             return None;
         }
@@ -209,6 +209,6 @@ impl Iterator for Panels {
         };
         let middle = 0.5 * (start + border);
         let inside = self.whole || (middle > self.low && middle < self.low + self.width * self.count);
-        Some(Panel { start, end: border, last: self.done, inside, share, share_slope })
+        Some(TemperaturePanel { start, end: border, last: self.done, inside, share, share_slope })
     }
 }

@@ -10,7 +10,7 @@ mod scheme;
 
 pub use exact::{CoolingCurve, avrami, cooling_curve};
 pub use growth::{Growth, PANELS, Panels};
-pub use scheme::Scheme;
+pub use scheme::KineticScheme;
 
 use crate::error::Error;
 use polycore::numerics::bisected;
@@ -20,7 +20,7 @@ pub const GAS_CONSTANT: f64 = 8.314;
 
 /// Constants of Eqs (4.6) and (4.7), SI.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Constants {
+pub struct KineticConstants {
     /// Growth rate constant K₀, 1/s.
     pub growth_rate: f64,
     /// Nucleation constant K_G, K².
@@ -35,7 +35,7 @@ pub struct Constants {
     pub avrami_exponent: f64,
 }
 
-impl Constants {
+impl KineticConstants {
     /// Table 4.1, column 1: PA12 after its reference \[108\] (Zhao et al.).
     pub const TABLE_4_1_COLUMN_1: Self = Self {
         growth_rate: 37_869.0,
@@ -71,7 +71,7 @@ const LARGEST_Z: f64 = 1e30;
 /// Rate K(T) of a polymer, Eqs (4.6) and (4.7), and the relation of α and z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Kinetics {
-    constants: Constants,
+    constants: KineticConstants,
     /// K₀ (ln 2)^{1/n}.
     prefactor: f64,
     /// U/R.
@@ -84,8 +84,8 @@ impl Kinetics {
     /// # Errors
     /// [`Error::Parameter`] for K₀ or K_G ≤ 0, U < 0, T∞ < 0 K, T₀ ≤ T∞, n outside \[1, 10\] (below 1 the
     /// rate dα/dt would be infinite at α = 0), and values that are not finite.
-    pub fn new(constants: Constants) -> Result<Self, Error> {
-        let Constants {
+    pub fn new(constants: KineticConstants) -> Result<Self, Error> {
+        let KineticConstants {
             growth_rate,
             nucleation,
             activation_energy,
@@ -121,7 +121,7 @@ impl Kinetics {
     }
 
     /// Constants.
-    pub fn constants(&self) -> &Constants {
+    pub fn constants(&self) -> &KineticConstants {
         &self.constants
     }
 
@@ -129,7 +129,7 @@ impl Kinetics {
     /// K(T) = (ln 2)^{1/n} K₀ exp(−U/(R(T−T∞))) exp(−K_G(T+T₀)/(2T²(T₀−T))).
     #[inline]
     pub fn rate(&self, temperature: f64) -> f64 {
-        let Constants { nucleation, equilibrium_melting, frozen, .. } = self.constants;
+        let KineticConstants { nucleation, equilibrium_melting, frozen, .. } = self.constants;
         if !(temperature > frozen && temperature < equilibrium_melting) {
             return 0.0;
         }
@@ -149,7 +149,7 @@ impl Kinetics {
 
     /// d ln K/dT within (T∞, T₀).
     fn logarithmic_slope(&self, temperature: f64) -> f64 {
-        let Constants { nucleation, equilibrium_melting, frozen, .. } = self.constants;
+        let KineticConstants { nucleation, equilibrium_melting, frozen, .. } = self.constants;
         let (above, below) = (temperature - frozen, equilibrium_melting - temperature);
         let barrier =
             nucleation * (temperature + equilibrium_melting) / (2.0 * temperature * temperature * below);

@@ -5,7 +5,7 @@ use super::Kinetics;
 /// A one-step scheme. The first two advance α by Eq. (4.5), as the thesis does, and may leave \[0, 1\]; the
 /// others advance z.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scheme {
+pub enum KineticScheme {
     /// Euler's method in α, Eq. (4.10).
     Euler,
     /// Classical Runge–Kutta method of four stages in α.
@@ -16,7 +16,7 @@ pub enum Scheme {
     Gauss2,
 }
 
-impl Scheme {
+impl KineticScheme {
     /// All schemes.
     pub const ALL: [Self; 4] = [Self::Euler, Self::RungeKutta4, Self::Midpoint, Self::Gauss2];
 

@@ -1,6 +1,6 @@
 //! The subroutine of Appendix B as coded, for comparison: Algorithm 1 by Euler's method, from a seed of 1e-3.
 
-use super::{Conductor, Point, Response, ThermalMaterial};
+use super::{Conductor, PointInput, ThermalMaterial, ThermalResponse};
 use crate::error::Error;
 
 /// Sign of the temperature increment that crystallizes.
@@ -9,14 +9,14 @@ pub enum Sign {
     /// `DTEMP > 0`, as printed: heating crystallizes and cooling melts.
     AsPublished,
     /// `DTEMP < 0`, corrected.
-    Mended,
+    Corrected,
 }
 
 /// Appendix B with its three missing parentheses. The arithmetic is the printed one, in single precision for
 /// `REAL` variables; temperatures are those at the start of the increment. The state holds its α, infinite
 /// and NaN included; energy and flux do not depend on it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct AsPublished {
+pub struct PublishedSubroutine {
     conductor: Conductor,
     sign: Sign,
     guarded: bool,
@@ -27,7 +27,7 @@ const ALPHA_MAX: f32 = 0.25;
 const T0: f32 = 466.0;
 const T_INF: f32 = 294.0;
 
-impl AsPublished {
+impl PublishedSubroutine {
     /// Returns the material; with `guarded`, K = 0 outside (T∞, T₀), otherwise the exponential overflows
     /// above T₀.
     pub fn new(conductor: Conductor, sign: Sign, guarded: bool) -> Self {
@@ -55,7 +55,7 @@ impl AsPublished {
         let kelvin = kelvin(temperature);
         let crystallizing = match self.sign {
             Sign::AsPublished => increment,
-            Sign::Mended => -increment,
+            Sign::Corrected => -increment,
         };
         if crystallizing > 0.0 {
             return (f64::from(old) + dt * f64::from(self.rate(old, kelvin))) as f32;
@@ -83,7 +83,7 @@ fn kelvin(temperature: f64) -> f32 {
     (temperature - 273.15 + 273.0) as f32
 }
 
-impl ThermalMaterial for AsPublished {
+impl ThermalMaterial for PublishedSubroutine {
     fn density(&self) -> f64 {
         self.conductor.density()
     }
@@ -120,7 +120,7 @@ impl ThermalMaterial for AsPublished {
         self.conductor.heat_potential(temperature)
     }
 
-    fn respond(&self, at: &Point, old: &[f64], new: &mut [f64]) -> Result<Response, Error> {
+    fn respond(&self, at: &PointInput, old: &[f64], new: &mut [f64]) -> Result<ThermalResponse, Error> {
         let response = self.conductor.conduct(at)?;
         new[0] = f64::from(self.alpha(old[0] as f32, at.temperature, at.increment, at.dt));
         Ok(response)

@@ -1,6 +1,6 @@
 //! A plain conductor: Fourier's law, with constant or tabulated properties.
 
-use super::{Point, Property, Response, ThermalMaterial};
+use super::{PointInput, ThermalMaterial, ThermalProperty, ThermalResponse};
 use crate::error::Error;
 use nalgebra::{Matrix3, Vector3};
 
@@ -9,8 +9,8 @@ use nalgebra::{Matrix3, Vector3};
 #[derive(Clone, Debug, PartialEq)]
 pub struct Conductor {
     density: f64,
-    conductivity: Property,
-    specific_heat: Property,
+    conductivity: ThermalProperty,
+    specific_heat: ThermalProperty,
     /// D, along x, y, z.
     directions: Vector3<f64>,
 }
@@ -20,7 +20,11 @@ impl Conductor {
     ///
     /// # Errors
     /// [`Error::Parameter`] unless the density is above 0 and finite.
-    pub fn new(density: f64, conductivity: Property, specific_heat: Property) -> Result<Self, Error> {
+    pub fn new(
+        density: f64,
+        conductivity: ThermalProperty,
+        specific_heat: ThermalProperty,
+    ) -> Result<Self, Error> {
         if density > 0.0 && density.is_finite() {
             return Ok(Self { density, conductivity, specific_heat, directions: Vector3::repeat(1.0) });
         }
@@ -50,7 +54,7 @@ impl Conductor {
     /// [`ThermalMaterial::potential`].
     pub(super) fn heat_potential(&self, temperature: f64) -> Option<[f64; 2]> {
         let conductivity = &self.conductivity;
-        conductivity.jumps().then(|| [conductivity.integral(temperature), conductivity.at(temperature)])
+        conductivity.jumps().then(|| [conductivity.integral(temperature), conductivity.value_at(temperature)])
     }
 
     /// Returns whether both properties are constant.
@@ -59,13 +63,13 @@ impl Conductor {
     }
 
     /// Computes the response.
-    pub(super) fn conduct(&self, at: &Point) -> Result<Response, Error> {
+    pub(super) fn conduct(&self, at: &PointInput) -> Result<ThermalResponse, Error> {
         let temperature = at.check()?;
         let [conductivity, slope] = self.conductivity.with_slope(temperature);
         let gradient = self.directions.component_mul(&at.gradient);
-        Ok(Response {
+        Ok(ThermalResponse {
             energy: self.specific_heat.integral(temperature),
-            d_energy_d_temperature: self.specific_heat.at(temperature),
+            d_energy_d_temperature: self.specific_heat.value_at(temperature),
             flux: -conductivity * gradient,
             d_flux_d_temperature: -slope * gradient,
             d_flux_d_gradient: Matrix3::from_diagonal(&(-conductivity * self.directions)),
@@ -74,7 +78,7 @@ impl Conductor {
     }
 }
 
-impl Point {
+impl PointInput {
     /// Returns the temperature at the end of the increment, K, if valid.
     ///
     /// # Errors
@@ -123,7 +127,7 @@ impl ThermalMaterial for Conductor {
         self.heat_potential(temperature)
     }
 
-    fn respond(&self, at: &Point, _old: &[f64], _new: &mut [f64]) -> Result<Response, Error> {
+    fn respond(&self, at: &PointInput, _old: &[f64], _new: &mut [f64]) -> Result<ThermalResponse, Error> {
         self.conduct(at)
     }
 }

@@ -7,10 +7,10 @@ use crate::melting::Melting;
 pub(super) const HEATING_PANELS: usize = 4 * PANELS;
 
 /// ln of the melted fraction's complement above which melting is negligible.
-pub(super) const NOTHING: f64 = -1e-17;
+pub(super) const NEGLIGIBLE_MELTING: f64 = -1e-17;
 
 /// Smallest z that can melt: quotients of smaller numbers overflow.
-pub(super) const FAINT: f64 = 1e-280;
+pub(super) const SMALLEST_MELTING_Z: f64 = 1e-280;
 
 /// Kinetics and melting: dz/dt = K(T) at every temperature; on heating α falls in proportion to 1 − X_m(T).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,7 +40,7 @@ impl Crystallization {
     pub fn advance(&self, z: f64, start: f64, end: f64, dt: f64) -> Grown {
         let kinetics = &self.kinetics;
         let melting = match &self.melting {
-            Some(melting) if end > start && melting.survival(end)[0] < NOTHING => melting,
+            Some(melting) if end > start && melting.survival(end)[0] < NEGLIGIBLE_MELTING => melting,
             _ => {
                 let growth = kinetics.growth(start, end, dt);
                 return Grown { z: z + growth.z, slope: growth.slope };
@@ -70,7 +70,7 @@ impl Crystallization {
     pub(super) fn melt(&self, grown: Grown, logarithm: f64, slope: f64) -> Grown {
         let kinetics = &self.kinetics;
         let Grown { z, slope: z_slope } = grown;
-        if z == 0.0 || logarithm > NOTHING {
+        if z == 0.0 || logarithm > NEGLIGIBLE_MELTING {
             return grown;
         }
         let before = kinetics.extent(z);
@@ -79,7 +79,7 @@ impl Crystallization {
         let remainder = lost + survivors * before.remainder;
         let power = if degree < 0.5 { -(-degree).ln_1p() } else { -remainder.ln() };
         let z_after = kinetics.z_of_power(power);
-        if degree < FAINT {
+        if degree < SMALLEST_MELTING_Z {
             return Grown { z: 0.0, slope: 0.0 };
         }
         let after = Extent { power, degree, remainder };
@@ -92,12 +92,12 @@ impl Crystallization {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kinetics::Constants;
+    use crate::kinetics::KineticConstants;
 
     /// A jump equals the sequence of smaller jumps.
     #[test]
     fn jumps_follow_each_other() {
-        let kinetics = Kinetics::new(Constants::TABLE_4_1_COLUMN_1).unwrap();
+        let kinetics = Kinetics::new(KineticConstants::TABLE_4_1_COLUMN_1).unwrap();
         let law = Crystallization { kinetics, melting: Some(Melting::PA12) };
         for z in [1e-6, 0.3, 1.2, 3.0] {
             let to = |z: f64, start: f64, end: f64| law.advance(z, start, end, 0.0).z;

@@ -1,6 +1,6 @@
 //! A material that fills a fraction of its elements.
 
-use super::{Crystallization, Point, Response, ThermalMaterial};
+use super::{Crystallization, PointInput, ThermalMaterial, ThermalResponse};
 use crate::error::Error;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -110,9 +110,9 @@ impl ThermalMaterial for Filled {
         Some(&self.of)
     }
 
-    fn respond(&self, at: &Point, old: &[f64], new: &mut [f64]) -> Result<Response, Error> {
+    fn respond(&self, at: &PointInput, old: &[f64], new: &mut [f64]) -> Result<ThermalResponse, Error> {
         let own = self.of.respond(at, old, new)?;
-        Ok(Response {
+        Ok(ThermalResponse {
             flux: self.fill * own.flux,
             d_flux_d_temperature: self.fill * own.d_flux_d_temperature,
             d_flux_d_gradient: self.fill * own.d_flux_d_gradient,

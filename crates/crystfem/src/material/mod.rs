@@ -10,12 +10,12 @@ mod property;
 mod rows;
 mod semicrystalline;
 
-pub use as_published::{AsPublished, Sign};
+pub use as_published::{PublishedSubroutine, Sign};
 pub use conductor::Conductor;
 pub use crystallization::{Crystallization, Grown};
 pub use filled::{Filled, fill_elements};
 pub use powder::Powder;
-pub use property::{Property, REFERENCE_TEMPERATURE, Table};
+pub use property::{PropertyTable, REFERENCE_TEMPERATURE, ThermalProperty};
 pub(crate) use rows::{Increments, Scratch};
 pub use semicrystalline::{CONSTANT_NAMES, LARGEST_CHANGE, Polymer, Semicrystalline};
 
@@ -25,7 +25,7 @@ use std::sync::Arc;
 
 /// Input of a material at one integration point.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Point {
+pub struct PointInput {
     /// Temperature at the start of the increment, K.
     pub temperature: f64,
     /// Increment of temperature, K: the end is `temperature + increment`.
@@ -38,7 +38,7 @@ pub struct Point {
 
 /// Output of a material at the end of an increment.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Response {
+pub struct ThermalResponse {
     /// Internal energy per mass U, J/kg, from a fixed reference.
     pub energy: f64,
     /// ∂U/∂T at fixed Δt, the consistent tangent with ∂α/∂T, J/(kg K).
@@ -84,8 +84,8 @@ pub trait ThermalMaterial: Send + Sync {
         self.is_linear()
     }
     /// Kirchhoff's potential θ = ∫k dT, W/m, and k at a temperature, if k changes so steeply that the flux in
-    /// elements must follow from θ at their nodes, f = −D ∇θ (see [`Property::jumps`]); `None` if the flux of
-    /// [`Self::respond`] applies.
+    /// elements must follow from θ at their nodes, f = −D ∇θ (see [`ThermalProperty::jumps`]); `None` if the
+    /// flux of [`Self::respond`] applies.
     fn potential(&self, _temperature: f64) -> Option<[f64; 2]> {
         None
     }
@@ -102,7 +102,7 @@ pub trait ThermalMaterial: Send + Sync {
     ///
     /// # Errors
     /// [`Error::Parameter`] for temperatures that are not finite and a Δt that is not finite or below 0.
-    fn respond(&self, at: &Point, old: &[f64], new: &mut [f64]) -> Result<Response, Error>;
+    fn respond(&self, at: &PointInput, old: &[f64], new: &mut [f64]) -> Result<ThermalResponse, Error>;
 }
 
 #[cfg(test)]

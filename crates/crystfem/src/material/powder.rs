@@ -1,6 +1,6 @@
 //! A material that is powder until it first melts.
 
-use super::{Point, Response, ThermalMaterial};
+use super::{PointInput, ThermalMaterial, ThermalResponse};
 use crate::error::Error;
 
 /// Names of states and fields, without and with those of a crystallizing solid.
@@ -105,13 +105,13 @@ impl<M: ThermalMaterial> ThermalMaterial for Powder<M> {
         false
     }
 
-    fn respond(&self, at: &Point, old: &[f64], new: &mut [f64]) -> Result<Response, Error> {
+    fn respond(&self, at: &PointInput, old: &[f64], new: &mut [f64]) -> Result<ThermalResponse, Error> {
         let own = self.solid_states();
         let response = self.of.respond(at, &old[..own], &mut new[..own])?;
         let [part, slope] = self.consolidated(at.temperature + at.increment, old[own]);
         new[own] = part;
         let factor = self.share + (1.0 - self.share) * part;
-        Ok(Response {
+        Ok(ThermalResponse {
             flux: factor * response.flux,
             d_flux_d_temperature: factor * response.d_flux_d_temperature
                 + (1.0 - self.share) * slope * response.flux,
@@ -124,16 +124,18 @@ impl<M: ThermalMaterial> ThermalMaterial for Powder<M> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::material::{Conductor, Property, Semicrystalline};
+    use crate::material::{Conductor, Semicrystalline, ThermalProperty};
     use nalgebra::Vector3;
 
     fn powder() -> Powder<Conductor> {
-        let solid = Conductor::new(1000.0, Property::Constant(0.25), Property::Constant(2000.0)).unwrap();
+        let solid =
+            Conductor::new(1000.0, ThermalProperty::Constant(0.25), ThermalProperty::Constant(2000.0))
+                .unwrap();
         Powder::new(solid, 0.4, [440.0, 450.0]).unwrap()
     }
 
-    fn flux(from: f64, to: f64, before: f64) -> (Response, f64) {
-        let at = Point {
+    fn flux(from: f64, to: f64, before: f64) -> (ThermalResponse, f64) {
+        let at = PointInput {
             temperature: from,
             increment: to - from,
             gradient: Vector3::new(8.0, 0.0, -4.0),
@@ -144,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn it_consolidates_once() {
+    fn powder_consolidates_once() {
         for (from, to, before, part) in [
             (300.0, 430.0, 0.0, 0.0),
             (430.0, 445.0, 0.0, 0.5),

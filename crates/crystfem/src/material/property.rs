@@ -6,31 +6,31 @@ use crate::error::Error;
 pub const REFERENCE_TEMPERATURE: f64 = 273.15;
 
 /// Relative change within 1 K above which a property counts as a jump.
-const STEEPEST: f64 = 0.1;
+const JUMP_CHANGE: f64 = 0.1;
 
 /// A positive, temperature-dependent property.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Property {
+pub enum ThermalProperty {
     /// A constant.
     Constant(f64),
     /// Linear between given values, constant outside.
-    Table(Table),
+    Table(PropertyTable),
 }
 
-/// Temperatures and values of a [`Property`].
+/// Temperatures and values of a [`ThermalProperty`].
 #[derive(Clone, Debug, PartialEq)]
-pub struct Table {
+pub struct PropertyTable {
     temperatures: Vec<f64>,
     values: Vec<f64>,
     /// Integrals from the first temperature to each.
     integrals: Vec<f64>,
     /// Integral from the first temperature to the reference.
     offset: f64,
-    /// Steep change, see [`Property::jumps`].
+    /// Steep change, see [`ThermalProperty::jumps`].
     jumps: bool,
 }
 
-impl Property {
+impl ThermalProperty {
     /// Returns a constant; `name` is for the error.
     ///
     /// # Errors
@@ -69,16 +69,16 @@ impl Property {
         }
         let jumps = temperatures.windows(2).zip(values.windows(2)).any(|(t, v)| {
             let change = (v[1] - v[0]).abs() / v[0].min(v[1]);
-            change > STEEPEST * (t[1] - t[0])
+            change > JUMP_CHANGE * (t[1] - t[0])
         });
-        let mut table = Table { temperatures, values, integrals, offset: 0.0, jumps };
+        let mut table = PropertyTable { temperatures, values, integrals, offset: 0.0, jumps };
         table.offset = table.integral(REFERENCE_TEMPERATURE);
         Ok(Self::Table(table))
     }
 
     /// Returns the value at a temperature, K.
     #[inline]
-    pub fn at(&self, temperature: f64) -> f64 {
+    pub fn value_at(&self, temperature: f64) -> f64 {
         self.with_slope(temperature)[0]
     }
 
@@ -114,7 +114,7 @@ impl Property {
     }
 }
 
-impl Table {
+impl PropertyTable {
     /// Rows of temperature, K, and value.
     pub fn rows(&self) -> impl Iterator<Item = [f64; 2]> {
         self.temperatures.iter().zip(&self.values).map(|(&temperature, &value)| [temperature, value])
@@ -162,8 +162,8 @@ fn positive(name: &'static str, value: f64) -> Result<(), Error> {
 mod tests {
     use super::*;
 
-    fn table(temperatures: &[f64], values: &[f64]) -> Result<Property, Error> {
-        Property::table("specific heat, J/(kg K)", temperatures.to_vec(), values.to_vec())
+    fn table(temperatures: &[f64], values: &[f64]) -> Result<ThermalProperty, Error> {
+        ThermalProperty::table("specific heat, J/(kg K)", temperatures.to_vec(), values.to_vec())
     }
 
     /// A parabola is the integral of a straight line: 1000 + 2 (T − 300) between 300 and 400 K, constant
@@ -181,7 +181,7 @@ mod tests {
         assert_eq!((heat.with_slope(299.0), heat.with_slope(400.0)), ([1000.0, 0.0], [1200.0, 0.0]));
         assert!(!heat.is_constant());
         let single = table(&[300.0], &[7.0]).unwrap();
-        assert_eq!((single.at(0.0), single.at(300.0), single.at(1e4)), (7.0, 7.0, 7.0));
+        assert_eq!((single.value_at(0.0), single.value_at(300.0), single.value_at(1e4)), (7.0, 7.0, 7.0));
         assert!(single.is_constant() && (single.integral(373.15) - 700.0).abs() < 1e-10);
     }
 
@@ -192,7 +192,7 @@ mod tests {
         for step in 0..400 {
             let t = 200.5 + f64::from(step);
             let difference = (heat.integral(t + 1e-3) - heat.integral(t - 1e-3)) / 2e-3;
-            assert!((difference - heat.at(t)).abs() < 1e-5 * heat.at(t), "{t}");
+            assert!((difference - heat.value_at(t)).abs() < 1e-5 * heat.value_at(t), "{t}");
         }
     }
 
@@ -207,6 +207,6 @@ mod tests {
         );
         assert!(message(&[300.0, f64::NAN], &[1.0, 2.0]).contains("found NaN"));
         assert!(message(&[300.0, 400.0], &[1.0, 0.0]).contains("found 0; allowed: above 0"));
-        assert!(Property::constant("k", f64::INFINITY).is_err());
+        assert!(ThermalProperty::constant("k", f64::INFINITY).is_err());
     }
 }

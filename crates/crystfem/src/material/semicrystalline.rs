@@ -1,14 +1,14 @@
 //! A semicrystalline polymer: Fourier's law, crystallization and melting, optional latent heat.
 
-use super::{Conductor, Crystallization, Point, Property, Response, ThermalMaterial};
+use super::{Conductor, Crystallization, PointInput, ThermalMaterial, ThermalProperty, ThermalResponse};
 use crate::error::Error;
-use crate::kinetics::{Constants, Kinetics};
+use crate::kinetics::{KineticConstants, Kinetics};
 use crate::melting::Melting;
 
 /// Change of α per increment at which the suggested step equals the present one.
 pub const LARGEST_CHANGE: f64 = 0.1;
 /// Largest suggested ratio of next to present step.
-pub(super) const LONGEST: f64 = 10.0;
+pub(super) const MAX_STEP_RATIO: f64 = 10.0;
 
 /// Names of the constants of growth and melting in exports, in the order of [`Polymer::growth_and_melting`].
 pub const CONSTANT_NAMES: [&str; 9] = [
@@ -29,9 +29,9 @@ pub struct Polymer {
     /// Density ρ, kg/m³.
     pub density: f64,
     /// Conductivity k, W/(m K).
-    pub conductivity: Property,
+    pub conductivity: ThermalProperty,
     /// Specific heat c, J/(kg K).
-    pub specific_heat: Property,
+    pub specific_heat: ThermalProperty,
     /// Kinetics of crystallization.
     pub kinetics: Kinetics,
     /// Melting on heating; `None` if crystals never melt.
@@ -115,9 +115,9 @@ impl Semicrystalline {
     pub fn pa12() -> Result<Self, Error> {
         Self::new(Polymer {
             density: 1010.0,
-            conductivity: Property::Constant(0.25),
-            specific_heat: Property::Constant(2200.0),
-            kinetics: Kinetics::new(Constants::TABLE_4_1_COLUMN_1)?,
+            conductivity: ThermalProperty::Constant(0.25),
+            specific_heat: ThermalProperty::Constant(2200.0),
+            kinetics: Kinetics::new(KineticConstants::TABLE_4_1_COLUMN_1)?,
             melting: Some(Melting::PA12),
             ultimate_crystallinity: 0.25,
             latent_heat: Some(209e3),
@@ -192,7 +192,7 @@ impl ThermalMaterial for Semicrystalline {
         Some(&self.crystallization)
     }
 
-    fn respond(&self, at: &Point, old: &[f64], new: &mut [f64]) -> Result<Response, Error> {
+    fn respond(&self, at: &PointInput, old: &[f64], new: &mut [f64]) -> Result<ThermalResponse, Error> {
         let mut response = self.conductor.conduct(at)?;
         let grown =
             self.crystallization.advance(old[0], at.temperature, at.temperature + at.increment, at.dt);
@@ -204,15 +204,17 @@ impl ThermalMaterial for Semicrystalline {
         // |∂α/∂z| ≤ n: small growth suggests the longest step without evaluating α
         if self.latent.is_none()
             && grown.z < 1.0
-            && kinetics.constants().avrami_exponent * (grown.z - old[0]).abs() <= LARGEST_CHANGE / LONGEST
+            && kinetics.constants().avrami_exponent * (grown.z - old[0]).abs()
+                <= LARGEST_CHANGE / MAX_STEP_RATIO
         {
-            response.step_ratio = Some(LONGEST);
+            response.step_ratio = Some(MAX_STEP_RATIO);
             return Ok(response);
         }
         let [after, slope] = kinetics.degree_and_slope(grown.z);
         if grown.z != old[0] {
             let change = (after - kinetics.degree(old[0])).abs();
-            response.step_ratio = (change > 0.0).then(|| (LARGEST_CHANGE / change).clamp(0.1, LONGEST));
+            response.step_ratio =
+                (change > 0.0).then(|| (LARGEST_CHANGE / change).clamp(0.1, MAX_STEP_RATIO));
         }
         if let Some(latent) = self.latent {
             response.energy -= latent * after;

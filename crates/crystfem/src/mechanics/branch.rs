@@ -3,7 +3,7 @@
 /// Input of a branch over a step: s is the fraction of the network that exists (1 for the amorphous phase), b
 /// its softening.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Change {
+pub struct BranchInput {
     /// Reduced time over relaxation time, y = Δξ/τ ≥ 0; 0 if elastic.
     pub relaxation: f64,
     /// s at the start and the end, 0 to 1.
@@ -14,7 +14,7 @@ pub struct Change {
 
 /// Step of a branch of modulus 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Step {
+pub struct BranchStep {
     /// e₂ = `carried` e₁ + `gained` Δε for the elastic strain e and the mechanical strain increment Δε.
     pub carried: f64,
     /// See [`Self::carried`].
@@ -22,13 +22,13 @@ pub struct Step {
     /// b₂ s₂, or its mean over a growing network: the stiffness of the step is this times h = (1 − e^{−y})/y,
     /// and the stress at the end b₂ s₂ e₂.
     pub stiffness: f64,
-    change: Change,
+    change: BranchInput,
     forms: Forms,
 }
 
 /// Energies of a step over the modulus, with e:Ĉ:e for squares.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Energies {
+pub struct BranchEnergies {
     /// Work of the branch's stress on Δε.
     pub work: f64,
     /// Increase of the stored energy.
@@ -43,7 +43,7 @@ pub struct Energies {
     pub softening: f64,
 }
 
-impl Energies {
+impl BranchEnergies {
     /// Balance work + softening − stored − viscous − growth − melting: 0 to rounding.
     pub fn closure(&self) -> f64 {
         self.work + self.softening - self.stored - self.viscous - self.growth - self.melting
@@ -103,12 +103,12 @@ impl Forms {
     }
 }
 
-impl Step {
+impl BranchStep {
     /// Computes the step: growth e ← (s₁ e^{−y} e + s̄ h Δε)/s₂, melting e ← e^{−y} e + h Δε, s̄ = ½(s₁ +
     /// s₂). New crystals are born without stress (Bažant's solidification); melting ones lose theirs. Linear
     /// in Δε, unconditionally stable.
-    pub fn new(change: Change) -> Self {
-        let Change { relaxation, share: [before, after], softening } = change;
+    pub fn new(change: BranchInput) -> Self {
+        let BranchInput { relaxation, share: [before, after], softening } = change;
         let forms = Forms::new(relaxation);
         let (decay, mean) = ((-relaxation).exp(), 0.5 * (before + after));
         let (carried, gained) = if after < before {
@@ -124,8 +124,8 @@ impl Step {
 
     /// Computes the energies from e:Ĉ:e, e:Ĉ:Δε and Δε:Ĉ:Δε with the initial elastic strain e: growth or
     /// melting to s̄, relaxation there, and the rest of growth or melting (Strang splitting).
-    pub fn energies(&self, ee: f64, ed: f64, dd: f64) -> Energies {
-        let Change { share: [before, after], softening: [soft, hard], .. } = self.change;
+    pub fn energies(&self, ee: f64, ed: f64, dd: f64) -> BranchEnergies {
+        let BranchInput { share: [before, after], softening: [soft, hard], .. } = self.change;
         let (mean, growing) = (0.5 * (before + after), after >= before);
         let [a, b, c] = self.forms.loss;
         // elastic strain after the first half: e times `first`
@@ -146,7 +146,7 @@ impl Step {
         } else {
             (0.0, 0.5 * hard * ((before - mean) * ee + (mean - after) * after_relaxation))
         };
-        Energies {
+        BranchEnergies {
             work: hard * mean * (self.forms.h * fed + self.forms.g * dd),
             stored: 0.5 * hard * after * last - 0.5 * soft * before * ee,
             viscous: hard * mean * (a * fee + 2.0 * b * fed + c * dd),
@@ -163,8 +163,8 @@ mod tests {
     use evidence::{at_most, near};
     use polycore::random::SplitMix64;
 
-    fn step(relaxation: f64, share: [f64; 2]) -> Step {
-        Step::new(Change { relaxation, share, softening: [1.0; 2] })
+    fn step(relaxation: f64, share: [f64; 2]) -> BranchStep {
+        BranchStep::new(BranchInput { relaxation, share, softening: [1.0; 2] })
     }
 
     /// Energies close and losses are not negative in 20,000 random steps, as in
@@ -182,7 +182,11 @@ mod tests {
             let soft = 0.2 + 0.8 * random.uniform();
             let relaxation = 10.0_f64.powf(8.0 * random.uniform() - 6.0);
             let increment = 1e-2 * random.normal();
-            let step = Step::new(Change { relaxation, share: [share, next], softening: [softening, soft] });
+            let step = BranchStep::new(BranchInput {
+                relaxation,
+                share: [share, next],
+                softening: [softening, soft],
+            });
             let found = step.energies(strain * strain, strain * increment, increment * increment);
             worst = worst.max(found.closure().abs() / 1e-4);
             least = least.min(found.viscous).min(found.growth).min(found.melting);

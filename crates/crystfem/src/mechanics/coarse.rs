@@ -10,11 +10,11 @@ use std::collections::BTreeMap;
 /// Nodes of a group along each axis.
 const SIDE: f64 = 4.0;
 /// Smallest pivot over its diagonal; below, the motion has no stiffness or is redundant.
-const DEAD: f64 = 1e-10;
+const MIN_PIVOT: f64 = 1e-10;
 const NONE: u32 = u32::MAX;
 
 /// Groups of nodes and the Cholesky factor of Pᵀ K P.
-pub struct Coarse {
+pub struct CoarseMotions {
     /// Group of each node, or [`NONE`].
     group: Vec<u32>,
     /// Displacement at each node by the motions of its group, 0 for fixed components.
@@ -22,7 +22,7 @@ pub struct Coarse {
     factor: Skyline,
 }
 
-impl Coarse {
+impl CoarseMotions {
     /// Builds the coarse space of elements on nodes at `points`.
     pub fn new(elements: &Elements, points: &[[f64; 3]]) -> Self {
         let free = elements.free();
@@ -174,7 +174,7 @@ impl Skyline {
             }
             let square: f64 = own[..length].iter().map(|x| x * x).sum();
             let left = own[length] - square;
-            own[length] = if left > DEAD * own[length] { left.sqrt() } else { 0.0 };
+            own[length] = if left > MIN_PIVOT * own[length] { left.sqrt() } else { 0.0 };
         }
     }
 

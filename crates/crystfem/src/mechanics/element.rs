@@ -4,15 +4,15 @@ use nalgebra::{SMatrix, SVector};
 use polycore::numerics::hexahedron::{self, CORNERS, slopes};
 
 /// Strain or stress, xx, yy, zz, xy, yz, zx, with engineering shear strains.
-pub type Six = SVector<f64, 6>;
+pub type VoigtVector = SVector<f64, 6>;
 /// Components of an element's nodes, 0 beyond its number.
-pub type Wide = SVector<f64, 30>;
+pub type ElementVector = SVector<f64, 30>;
 /// Forces of the modes of a hexahedron.
-pub type Modal = SVector<f64, 9>;
-type Nodal = SVector<f64, 24>;
+pub type ModalVector = SVector<f64, 9>;
+type HexahedronVector = SVector<f64, 24>;
 
 /// Number of Gauss points.
-pub const POINTS: usize = 8;
+pub const GAUSS_POINTS: usize = 8;
 
 /// Local coordinates of a Gauss point.
 pub fn gauss(point: usize) -> [f64; 3] {
@@ -43,11 +43,11 @@ pub fn strain_of(gradient: [f64; 3]) -> SMatrix<f64, 6, 3> {
 #[derive(Clone, Debug)]
 pub struct Hexahedron {
     /// Volumes of the Gauss points, m³.
-    pub weights: [f64; POINTS],
+    pub weights: [f64; GAUSS_POINTS],
     /// Strains of nodal displacements.
-    nodes: [SMatrix<f64, 6, 24>; POINTS],
+    nodes: [SMatrix<f64, 6, 24>; GAUSS_POINTS],
     /// Strains of the modes.
-    modes: [SMatrix<f64, 6, 9>; POINTS],
+    modes: [SMatrix<f64, 6, 9>; GAUSS_POINTS],
     /// K̂ after condensation, over the modulus.
     pub condensed: SMatrix<f64, 24, 24>,
     /// Coupling of nodes and modes.
@@ -65,10 +65,10 @@ impl Hexahedron {
         let elastic = stiffness(poisson);
         let centre = jacobian(corners, [0.0; 3]);
         let (centre_inverse, centre_volume) = (centre.try_inverse()?, centre.determinant());
-        let mut weights = [0.0; POINTS];
-        let mut nodes = [SMatrix::<f64, 6, 24>::zeros(); POINTS];
-        let mut modes = [SMatrix::<f64, 6, 9>::zeros(); POINTS];
-        for point in 0..POINTS {
+        let mut weights = [0.0; GAUSS_POINTS];
+        let mut nodes = [SMatrix::<f64, 6, 24>::zeros(); GAUSS_POINTS];
+        let mut modes = [SMatrix::<f64, 6, 9>::zeros(); GAUSS_POINTS];
+        for point in 0..GAUSS_POINTS {
             let at = gauss(point);
             let jacobian = jacobian(corners, at);
             let volume = jacobian.determinant();
@@ -91,7 +91,7 @@ impl Hexahedron {
         let mut full = SMatrix::<f64, 24, 24>::zeros();
         let mut coupling = SMatrix::<f64, 24, 9>::zeros();
         let mut own = SMatrix::<f64, 9, 9>::zeros();
-        for point in 0..POINTS {
+        for point in 0..GAUSS_POINTS {
             let weighed = elastic * weights[point];
             full += nodes[point].transpose() * weighed * nodes[point];
             coupling += nodes[point].transpose() * weighed * modes[point];
@@ -114,15 +114,15 @@ impl Hexahedron {
     }
 
     /// Stress over the modulus, from an elastic strain.
-    pub fn stress(&self, strain: &Six) -> Six {
+    pub fn stress(&self, strain: &VoigtVector) -> VoigtVector {
         self.elastic * strain
     }
 
     /// Nodal forces of stresses at the Gauss points, with condensed modes, and the forces of the modes, an
     /// input of [`Self::strains`].
-    pub fn forces(&self, stresses: &[Six; POINTS]) -> (Nodal, SVector<f64, 9>) {
-        let (mut nodal, mut modal) = (Nodal::zeros(), SVector::<f64, 9>::zeros());
-        for point in 0..POINTS {
+    pub fn forces(&self, stresses: &[VoigtVector; GAUSS_POINTS]) -> (HexahedronVector, SVector<f64, 9>) {
+        let (mut nodal, mut modal) = (HexahedronVector::zeros(), SVector::<f64, 9>::zeros());
+        for point in 0..GAUSS_POINTS {
             let weighed = stresses[point] * self.weights[point];
             nodal += self.nodes[point].transpose() * weighed;
             modal += self.modes[point].transpose() * weighed;
@@ -132,13 +132,18 @@ impl Hexahedron {
 
     /// Strain increments at the Gauss points from nodal displacements, with modes in equilibrium with the
     /// forces `modal` of the initial stresses over a stiffness `modulus` Ĉ.
-    pub fn strains(&self, displacement: &Nodal, modal: &SVector<f64, 9>, modulus: f64) -> [Six; POINTS] {
+    pub fn strains(
+        &self,
+        displacement: &HexahedronVector,
+        modal: &SVector<f64, 9>,
+        modulus: f64,
+    ) -> [VoigtVector; GAUSS_POINTS] {
         let modes = -(self.inverse * (modal / modulus + self.coupling.transpose() * displacement));
         std::array::from_fn(|point| self.nodes[point] * displacement + self.modes[point] * modes)
     }
 
     /// Rotation at the centre by nodal displacements, half their curl, rad.
-    pub fn rotation(&self, displacement: &Nodal) -> [f64; 3] {
+    pub fn rotation(&self, displacement: &HexahedronVector) -> [f64; 3] {
         let parts = self.middle.iter().enumerate();
         parts
             .fold(SVector::<f64, 3>::zeros(), |sum, (k, gradient)| {

@@ -1,10 +1,10 @@
 //! Solidifying Maxwell body: permanent amorphous branches, and a network of crystals.
 
-use super::branch::{Change, Energies, Step};
+use super::branch::{BranchEnergies, BranchInput, BranchStep};
 use super::eigenstrain::SpecificVolume;
 
 /// Stiffness over the sum of all moduli below which material flows instead of bearing stress.
-const MELT: f64 = 0.01;
+const MELT_STIFFNESS: f64 = 0.01;
 
 /// A Maxwell branch: a modulus that relaxes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,7 +88,7 @@ pub struct SolidifyingMaxwell {
 
 /// Response of a material point over a step, linear in the strain increment.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Increment {
+pub struct MaxwellIncrement {
     /// Linear free strain Δε*.
     pub free_strain: f64,
     /// Stiffness of the step over Ĉ, Pa, floor included: Δσ = stiffness Ĉ:(Δε − Δε* 1) plus relaxation.
@@ -98,7 +98,7 @@ pub struct Increment {
     /// True for a stiffness below 1 % of the sum of all moduli.
     pub melt: bool,
     /// Step of each branch, and its modulus times b₂ s₂ at the end.
-    branches: Vec<(Step, f64, f64)>,
+    branches: Vec<(BranchStep, f64, f64)>,
 }
 
 impl SolidifyingMaxwell {
@@ -167,14 +167,15 @@ impl SolidifyingMaxwell {
     }
 
     /// Increment from one (T, α) to another in a time, s; 0 is elastic.
-    pub fn increment(&self, from: [f64; 2], to: [f64; 2], duration: f64) -> Increment {
+    pub fn increment(&self, from: [f64; 2], to: [f64; 2], duration: f64) -> MaxwellIncrement {
         let temperatures = [from[0], to[0]];
         let mut branches = Vec::with_capacity(self.branches());
         let (mut stiffness, mut whole) = (0.0, 0.0);
         let mut add = |(list, shift): &(Vec<Branch>, Shift), share: [f64; 2], softening: [f64; 2]| {
             let reduced = shift.reduced_time(temperatures, duration);
             for branch in list {
-                let step = Step::new(Change { relaxation: reduced / branch.time, share, softening });
+                let step =
+                    BranchStep::new(BranchInput { relaxation: reduced / branch.time, share, softening });
                 stiffness += branch.modulus * step.stiffness;
                 whole += branch.modulus;
                 branches.push((step, branch.modulus, branch.modulus * softening[1] * share[1]));
@@ -184,8 +185,8 @@ impl SolidifyingMaxwell {
         add(&self.network, [from[1], to[1]], temperatures.map(|t| self.softness(t)));
         let free_strain = self.volume.strain(from, to);
         let floor = self.floor * whole;
-        let melt = stiffness < MELT * whole;
-        Increment { free_strain, stiffness: stiffness + floor, floor, melt, branches }
+        let melt = stiffness < MELT_STIFFNESS * whole;
+        MaxwellIncrement { free_strain, stiffness: stiffness + floor, floor, melt, branches }
     }
 
     /// Stress over Ĉ after a hold, Σ E_i e_i, Pa, per strain, for example of a component under uniaxial
@@ -199,7 +200,7 @@ impl SolidifyingMaxwell {
     }
 }
 
-impl Increment {
+impl MaxwellIncrement {
     /// Updates the elastic strains, of any components, from Δε of the same; `mechanical` is Δε − Δε* for a
     /// component with a free strain.
     pub fn advance<const N: usize>(&self, strains: &mut [[f64; N]], mechanical: &[f64; N]) {
@@ -225,8 +226,8 @@ impl Increment {
         strains: &[[f64; N]],
         mechanical: &[f64; N],
         product: impl Fn(&[f64; N], &[f64; N]) -> f64,
-    ) -> Energies {
-        let mut sum = Energies::default();
+    ) -> BranchEnergies {
+        let mut sum = BranchEnergies::default();
         for ((step, modulus, _), strain) in self.branches.iter().zip(strains) {
             let one = step.energies(
                 product(strain, strain),
@@ -243,7 +244,7 @@ impl Increment {
 mod tests {
     use super::*;
     use crate::exact::Wall;
-    use crate::kinetics::{Constants, Kinetics};
+    use crate::kinetics::{KineticConstants, Kinetics};
     use evidence::near;
 
     /// Returns α 1e-4/K, E∞ 0.4 and E₁ 0.6 GPa, τ 30 s. Without crystals the amorphous phase of one density
@@ -355,7 +356,7 @@ mod tests {
     /// latent heat, after 600 s: at centre and surface, free or held at its edges. σ = Σ E e/(1 − ν) with one
     /// in-plane elastic strain per branch.
     fn plate(body: &SolidifyingMaxwell, held: bool, history: &[(f64, Vec<f64>)]) -> [f64; 2] {
-        let kinetics = Kinetics::new(Constants::TABLE_4_1_COLUMN_1).unwrap();
+        let kinetics = Kinetics::new(KineticConstants::TABLE_4_1_COLUMN_1).unwrap();
         let count = history[0].1.len();
         let mut temperatures = vec![493.15; count];
         let mut grown = vec![0.0; count];

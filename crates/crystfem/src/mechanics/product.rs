@@ -1,7 +1,7 @@
 //! Products of element matrices with displacements: vectorized element by element, then summed at each node
 //! in the order of its elements, so that the bits do not depend on threads.
 
-use super::element::Wide;
+use super::element::ElementVector;
 use crate::system::vector::sum;
 use nalgebra::{Matrix3, Vector3};
 use polycore::numerics::Groups;
@@ -14,7 +14,7 @@ const ITEM: usize = 512;
 const COMPONENTS: usize = 24;
 
 /// Load of nodes, as a sum of forces.
-pub(super) struct Load {
+pub(super) struct NodalLoad {
     pub(super) sum: Vec<Vector3<f64>>,
     /// Sum of the squares of all contributions.
     pub(super) parts: f64,
@@ -84,7 +84,7 @@ impl<'a> Elements<'a> {
         let parts = of_hexahedra.par_chunks_mut(COMPONENTS * ITEM);
         parts.zip(hexahedra.par_chunks(ITEM)).for_each(|(forces, list)| {
             let (forces, _) = forces.as_chunks_mut();
-            arch.dispatch(Product { list, u, forces });
+            arch.dispatch(HexahedraProduct { list, u, forces });
         });
         plain_product(first, u, of_first);
         plain_product(second, u, of_second);
@@ -122,13 +122,13 @@ fn plain_product<const N: usize>(list: &[Stiff<N>], u: &[Vector3<f64>], forces: 
     });
 }
 
-struct Product<'a, 'b> {
+struct HexahedraProduct<'a, 'b> {
     list: &'a [Stiff<'b, 8>],
     u: &'a [Vector3<f64>],
     forces: &'a mut [[f64; COMPONENTS]],
 }
 
-impl WithSimd for Product<'_, '_> {
+impl WithSimd for HexahedraProduct<'_, '_> {
     type Output = ();
 
     #[inline(always)]
@@ -169,8 +169,8 @@ pub fn dot(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {
 }
 
 /// Gathers the displacements of an element's nodes.
-pub(super) fn gather(nodes: &[u32], u: &[Vector3<f64>]) -> Wide {
-    let mut local = Wide::zeros();
+pub(super) fn gather(nodes: &[u32], u: &[Vector3<f64>]) -> ElementVector {
+    let mut local = ElementVector::zeros();
     for (k, &node) in nodes.iter().enumerate() {
         local.fixed_rows_mut::<3>(3 * k).copy_from(&u[node as usize]);
     }

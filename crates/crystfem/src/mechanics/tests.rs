@@ -8,7 +8,7 @@ fn elastic(modulus: f64) -> SolidifyingMaxwell {
     SolidifyingMaxwell::elastic(modulus, 0.0, 0.0, f64::INFINITY)
 }
 
-fn hold(modulus: f64) -> Increment {
+fn hold(modulus: f64) -> MaxwellIncrement {
     elastic(modulus).increment([300.0, 0.0], [300.0, 0.0], 0.0)
 }
 
@@ -44,7 +44,7 @@ fn block(count: [usize; 3], size: [f64; 3]) -> Mesh {
 
 /// Returns 3-2-1 supports: the corner at the origin, two components of the corner along x, one of that along
 /// y.
-fn resting(mesh: &Mesh) -> Vec<Support> {
+fn resting(mesh: &Mesh) -> Vec<FixedComponent> {
     let far = |d: usize| {
         let most = mesh.points.iter().map(|p| p[d]).fold(0.0, f64::max);
         mesh.points.iter().position(|p| p[d] == most && (0..3).all(|e| e == d || p[e] == 0.0)).unwrap() as u32
@@ -81,7 +81,7 @@ fn the_patch_test_holds() {
         let linear = |p: [f64; 3]| [1e-3 * p[0] + 2e-3 * p[1], -1e-3 * p[2], 3e-3 * p[0] - 2e-3 * p[2]];
         let local = SVector::from_fn(|k, _| linear(corners[k / 3])[k % 3]);
         for strain in element.strains(&local, &SVector::zeros(), 1.0) {
-            let exact = Six::from_row_slice(&[1e-3, 0.0, -2e-3, 2e-3, -1e-3, 3e-3]);
+            let exact = VoigtVector::from_row_slice(&[1e-3, 0.0, -2e-3, 2e-3, -1e-3, 3e-3]);
             at_most("stress_patch_strain", (strain - exact).amax(), 1e-16);
         }
     }
@@ -94,7 +94,7 @@ fn a_free_cube_has_no_stress() {
     let mut body = Body::new(&mesh, 0.4).unwrap();
     body.born(0..27, 1);
     body.step(|_| hold(1e9), |_, _, place| 1e-2 * place[2] / 3e-3, &resting(&mesh)).unwrap();
-    let most = (0..27).flat_map(|e| (0..POINTS).map(move |p| (e, p)));
+    let most = (0..27).flat_map(|e| (0..GAUSS_POINTS).map(move |p| (e, p)));
     let most = most.flat_map(|(e, p)| body.stress(e, p)).fold(0.0_f64, |most, s| most.max(s.abs()));
     at_most("stress_free_cube", most / 1e7, 1e-10);
 }
@@ -165,7 +165,7 @@ fn layers_bend_their_substrate() {
 fn a_part_is_released_from_its_bed() {
     let mesh = block([32, 1, 8], [0.064, 2e-3, 8e-3]);
     let mut body = Body::new(&mesh, 0.0).unwrap();
-    let bed: Vec<Support> = (0..mesh.points.len() as u32)
+    let bed: Vec<FixedComponent> = (0..mesh.points.len() as u32)
         .filter(|&n| mesh.points[n as usize][2] == 0.0)
         .flat_map(|n| (0..3).map(move |d| (n, d)))
         .collect();
@@ -174,7 +174,7 @@ fn a_part_is_released_from_its_bed() {
         let strain = -(0.010 + 0.004 * (layer as f64 + 0.5) / 8.0);
         body.step(|_| hold(1e9), |e, _, _| if e / 32 == layer { strain } else { 0.0 }, &bed).unwrap();
     }
-    let middle = (0..POINTS).map(|p| body.stress(16, p)[0]).sum::<f64>() / 8.0;
+    let middle = (0..GAUSS_POINTS).map(|p| body.stress(16, p)[0]).sum::<f64>() / 8.0;
     near("stress_on_the_bed", middle / 1.022_749_135e7, 1.0, 1e-6);
     body.step(|_| hold(1e9), |_, _, _| 0.0, &resting(&mesh)).unwrap();
     near("stress_released", curvature(&mesh, &body).abs() / 0.501_560_187, 1.0, 1e-5);
@@ -186,7 +186,7 @@ fn a_part_is_released_from_its_bed() {
 fn a_release_does_the_work_of_its_reactions() {
     let mesh = block([32, 1, 4], [0.064, 2e-3, 4e-3]);
     let mut body = Body::new(&mesh, 0.3).unwrap();
-    let bed: Vec<Support> = (0..mesh.points.len() as u32)
+    let bed: Vec<FixedComponent> = (0..mesh.points.len() as u32)
         .filter(|&n| mesh.points[n as usize][2] == 0.0)
         .flat_map(|n| (0..3).map(move |d| (n, d)))
         .collect();
@@ -195,7 +195,7 @@ fn a_release_does_the_work_of_its_reactions() {
     let before = body.state.clone();
     let mut reaction = vec![Vector3::<f64>::zeros(); mesh.points.len()];
     for (element, nodes) in mesh.hexahedra.iter().enumerate() {
-        let stresses = std::array::from_fn(|point| Six::from(body.stress(element, point)));
+        let stresses = std::array::from_fn(|point| VoigtVector::from(body.stress(element, point)));
         let (forces, _) = body.shape_of(element).forces(&stresses);
         for (k, &node) in nodes.iter().enumerate() {
             reaction[node as usize] += Vector3::from(forces.fixed_rows::<3>(3 * k));
@@ -235,7 +235,7 @@ fn iterations_do_not_follow_the_shape() {
         let mut body = Body::new(&mesh, 0.4).unwrap();
         body.tolerance = 1e-6;
         body.born(0..mesh.hexahedra.len(), 1);
-        let bed: Vec<Support> = (0..mesh.points.len() as u32)
+        let bed: Vec<FixedComponent> = (0..mesh.points.len() as u32)
             .filter(|&n| mesh.points[n as usize][2] == 0.0)
             .flat_map(|n| (0..3).map(move |d| (n, d)))
             .collect();
@@ -252,7 +252,7 @@ fn iterations_do_not_follow_the_shape() {
 }
 
 #[test]
-fn what_has_no_stress_is_refused() {
+fn unsupported_elements_are_refused() {
     let mesh = block([1, 1, 1], [1.0; 3]);
     assert!(Body::new(&mesh, 0.5).is_err() && Body::new(&mesh, f64::NAN).is_err());
     let mut twisted = mesh.clone();

@@ -1,8 +1,8 @@
 //! First- and second-order tetrahedra, of modulus 1.
 
-use super::element::{POINTS, Six, Wide, stiffness, strain_of};
+use super::element::{ElementVector, GAUSS_POINTS, VoigtVector, stiffness, strain_of};
 use crate::element::natural::Natural;
-use crate::mesh::Shape;
+use crate::mesh::ElementShape;
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
 /// Four-point rule, exact to degree 2: one barycentric coordinate is NEAR, three are FAR.
@@ -36,8 +36,8 @@ fn gauss(nodes: usize, point: usize) -> [f64; 3] {
     })
 }
 
-fn shape(nodes: usize) -> Shape {
-    if nodes == 4 { Shape::Tetrahedron } else { Shape::Tetrahedron10 }
+fn shape(nodes: usize) -> ElementShape {
+    if nodes == 4 { ElementShape::Tetrahedron } else { ElementShape::Tetrahedron10 }
 }
 
 impl Tetrahedron {
@@ -71,13 +71,13 @@ impl Tetrahedron {
     }
 
     /// Stress over the modulus, from an elastic strain.
-    pub fn stress(&self, strain: &Six) -> Six {
+    pub fn stress(&self, strain: &VoigtVector) -> VoigtVector {
         self.elastic * strain
     }
 
     /// Nodal forces of stresses at the Gauss points.
-    pub fn forces(&self, stresses: &[Six; POINTS]) -> Wide {
-        let mut forces = Wide::zeros();
+    pub fn forces(&self, stresses: &[VoigtVector; GAUSS_POINTS]) -> ElementVector {
+        let mut forces = ElementVector::zeros();
         for (point, own) in self.gradients.chunks_exact(self.nodes).enumerate() {
             let weighed = stresses[point] * self.weights[point];
             for (node, gradient) in own.iter().enumerate() {
@@ -89,8 +89,8 @@ impl Tetrahedron {
     }
 
     /// Strains at the Gauss points from nodal displacements, 0 beyond them.
-    pub fn strains(&self, displacement: &Wide) -> [Six; POINTS] {
-        let mut strains = [Six::zeros(); POINTS];
+    pub fn strains(&self, displacement: &ElementVector) -> [VoigtVector; GAUSS_POINTS] {
+        let mut strains = [VoigtVector::zeros(); GAUSS_POINTS];
         for (strain, own) in strains.iter_mut().zip(self.gradients.chunks_exact(self.nodes)) {
             for (node, gradient) in own.iter().enumerate() {
                 *strain += strain_of(*gradient) * displacement.fixed_rows::<3>(3 * node);
@@ -100,7 +100,7 @@ impl Tetrahedron {
     }
 
     /// Rotation at the centre by nodal displacements, half their curl, rad.
-    pub fn rotation(&self, displacement: &Wide) -> [f64; 3] {
+    pub fn rotation(&self, displacement: &ElementVector) -> [f64; 3] {
         let parts = self.middle.iter().enumerate();
         let sum = parts.fold(Vector3::zeros(), |sum: Vector3<f64>, (node, gradient)| {
             sum + Vector3::from(*gradient).cross(&displacement.fixed_rows::<3>(3 * node)) * 0.5
@@ -116,13 +116,13 @@ impl Tetrahedron {
 
 /// Shape functions at a Gauss point.
 pub fn shares(nodes: usize, point: usize) -> [f64; 10] {
-    let all = Natural::at(shape(nodes), gauss(nodes, point)).shapes;
+    let all = Natural::new(shape(nodes), gauss(nodes, point)).shapes;
     std::array::from_fn(|node| all[node])
 }
 
 /// Gradients of the shape functions, 1/m, and det ∂x/∂ξ, m³; `None` unless that is positive.
 fn derivatives(places: &[[f64; 3]], at: [f64; 3]) -> Option<(Vec<[f64; 3]>, f64)> {
-    let natural = Natural::at(shape(places.len()), at);
+    let natural = Natural::new(shape(places.len()), at);
     let own = natural.gradients.iter().zip(places);
     let jacobian = own.fold(Matrix3::zeros(), |sum: Matrix3<f64>, (local, place)| {
         sum + Vector3::from(*place) * Vector3::from(*local).transpose()

@@ -5,19 +5,19 @@ use std::path::Path;
 
 use crate::error::Error;
 use crate::file::line_error;
-use crate::mesh::Shape;
-use crate::mesh::file_mesh::{Content, Element, Kind, Node, ReadMesh};
+use crate::mesh::ElementShape;
+use crate::mesh::file_mesh::{ElementKind, FileContent, FileElement, FileNode, ReadMesh};
 
 mod cards;
 mod ignored;
-mod place;
+mod instance;
 mod sets;
 mod write;
 
 use cards::{Card, Cards};
 use ignored::Ignored;
-use place::Place;
-use sets::{Entry, Resolver, Set, SetKind};
+use instance::InstancePosition;
+use sets::{FileSet, Resolver, SetEntry, SetKind};
 pub use write::write;
 
 /// Reads a mesh, with coordinates multiplied by `scale` (1e-3 for a file in mm).
@@ -49,8 +49,13 @@ pub fn parse(path: &Path, bytes: &[u8], scale: f64) -> Result<ReadMesh, Error> {
 }
 
 fn mesh(path: &Path, cards: &mut Cards, scale: f64) -> Result<ReadMesh, Error> {
-    let mut reader =
-        Reader { path, content: Content::default(), sets: Vec::new(), single: BTreeMap::new(), place: None };
+    let mut reader = InputReader {
+        path,
+        content: FileContent::default(),
+        sets: Vec::new(),
+        single: BTreeMap::new(),
+        place: None,
+    };
     let mut ignored = Ignored::default();
     while let Some(card) = cards.next()? {
         match card.keyword.as_str() {
@@ -59,13 +64,13 @@ fn mesh(path: &Path, cards: &mut Cards, scale: f64) -> Result<ReadMesh, Error> {
             "NSET" => reader.set(card, SetKind::Nodes, "NSET", cards)?,
             "ELSET" => reader.set(card, SetKind::Elements, "ELSET", cards)?,
             "SURFACE" => reader.surface(card, cards)?,
-            "PART" => reader.once(&card)?,
+            "PART" => reader.check_single(&card)?,
             "INSTANCE" => {
-                reader.once(&card)?;
-                reader.place = Place::read(cards)?.or(reader.place);
+                reader.check_single(&card)?;
+                reader.place = InstancePosition::read(cards)?.or(reader.place);
             }
             "END PART" | "ASSEMBLY" | "END ASSEMBLY" | "END INSTANCE" | "HEADING" => {}
-            keyword if CHANGING.contains(&keyword) => {
+            keyword if MESH_CHANGING.contains(&keyword) => {
                 let allowed = "a file that contains all its nodes and elements itself";
                 return Err(line_error(path, card.line, "keyword", format!("*{keyword}"), allowed));
             }
@@ -75,9 +80,9 @@ fn mesh(path: &Path, cards: &mut Cards, scale: f64) -> Result<ReadMesh, Error> {
     if cards.included() > 0 {
         reader.content.notes.push(format!("{} files are included", cards.included()));
     }
-    ignored.tell(&mut reader.content.notes);
+    ignored.write_notes(&mut reader.content.notes);
     if let Some(place) = &reader.place {
-        reader.content.nodes.iter_mut().for_each(|node| node.point = place.of(node.point));
+        reader.content.nodes.iter_mut().for_each(|node| node.point = place.transform(node.point));
         reader.content.notes.push("the part is moved to the place of its instance".to_owned());
     }
     let [nodes, elements] = reader.content.labels(path)?;
@@ -88,7 +93,7 @@ fn mesh(path: &Path, cards: &mut Cards, scale: f64) -> Result<ReadMesh, Error> {
 }
 
 /// Keywords that make or move nodes and elements: skipping them would give another mesh.
-const CHANGING: [&str; 10] = [
+const MESH_CHANGING: [&str; 10] = [
     "NGEN",
     "NFILL",
     "NCOPY",
@@ -102,42 +107,45 @@ const CHANGING: [&str; 10] = [
 ];
 
 /// Element kinds by the stems of their names.
-const STEMS: [(Kind, &[&str]); 13] = [
-    (Kind::Solid(Shape::Hexahedron), &["C3D8", "DC3D8", "DCC3D8"]),
-    (Kind::Solid(Shape::Tetrahedron), &["C3D4", "DC3D4"]),
-    (Kind::Solid(Shape::Wedge), &["C3D6", "DC3D6"]),
-    (Kind::Solid(Shape::Hexahedron20), &["C3D20", "DC3D20"]),
-    (Kind::Solid(Shape::Tetrahedron10), &["C3D10", "DC3D10"]),
-    (Kind::Solid(Shape::Wedge15), &["C3D15", "DC3D15"]),
-    (Kind::Quadrangle8, &["S8", "M3D8", "SFM3D8", "DS8", "CPS8", "CPE8", "CAX8", "DC2D8"]),
-    (Kind::Triangle6, &["STRI65", "M3D6", "SFM3D6", "DS6", "CPS6", "CPE6", "CAX6", "DC2D6"]),
-    (Kind::Line3, &["T3D3", "T2D3", "B32", "B22", "DC1D3"]),
-    (Kind::Quadrangle, &["S4", "M3D4", "SFM3D4", "R3D4", "DS4", "CPS4", "CPE4", "CAX4", "DC2D4"]),
-    (Kind::Triangle, &["S3", "STRI3", "M3D3", "SFM3D3", "R3D3", "DS3", "CPS3", "CPE3", "CAX3", "DC2D3"]),
-    (Kind::Line, &["T3D2", "T2D2", "B31", "B21", "DC1D2"]),
-    (Kind::Point, &["MASS", "HEATCAP"]),
+const KIND_STEMS: [(ElementKind, &[&str]); 13] = [
+    (ElementKind::Solid(ElementShape::Hexahedron), &["C3D8", "DC3D8", "DCC3D8"]),
+    (ElementKind::Solid(ElementShape::Tetrahedron), &["C3D4", "DC3D4"]),
+    (ElementKind::Solid(ElementShape::Wedge), &["C3D6", "DC3D6"]),
+    (ElementKind::Solid(ElementShape::Hexahedron20), &["C3D20", "DC3D20"]),
+    (ElementKind::Solid(ElementShape::Tetrahedron10), &["C3D10", "DC3D10"]),
+    (ElementKind::Solid(ElementShape::Wedge15), &["C3D15", "DC3D15"]),
+    (ElementKind::Quadrangle8, &["S8", "M3D8", "SFM3D8", "DS8", "CPS8", "CPE8", "CAX8", "DC2D8"]),
+    (ElementKind::Triangle6, &["STRI65", "M3D6", "SFM3D6", "DS6", "CPS6", "CPE6", "CAX6", "DC2D6"]),
+    (ElementKind::Line3, &["T3D3", "T2D3", "B32", "B22", "DC1D3"]),
+    (ElementKind::Quadrangle, &["S4", "M3D4", "SFM3D4", "R3D4", "DS4", "CPS4", "CPE4", "CAX4", "DC2D4"]),
+    (
+        ElementKind::Triangle,
+        &["S3", "STRI3", "M3D3", "SFM3D3", "R3D3", "DS3", "CPS3", "CPE3", "CAX3", "DC2D3"],
+    ),
+    (ElementKind::Line, &["T3D2", "T2D2", "B31", "B21", "DC1D2"]),
+    (ElementKind::Point, &["MASS", "HEATCAP"]),
 ];
 
 /// Returns the kind of an element by its name in upper case: letters after a stem (R, I, H, T, …) denote
 /// integration and physics, not nodes.
-fn kind_of(name: &str) -> Option<Kind> {
+fn kind_of(name: &str) -> Option<ElementKind> {
     let is = |stem: &&str| {
         name.strip_prefix(stem).is_some_and(|rest| rest.bytes().all(|byte| byte.is_ascii_alphabetic()))
     };
-    STEMS.iter().find(|(_, stems)| stems.iter().any(&is)).map(|(kind, _)| *kind)
+    KIND_STEMS.iter().find(|(_, stems)| stems.iter().any(&is)).map(|(kind, _)| *kind)
 }
 
-struct Reader<'a> {
+struct InputReader<'a> {
     path: &'a Path,
-    content: Content,
-    sets: Vec<Set>,
+    content: FileContent,
+    sets: Vec<FileSet>,
     /// First lines of keywords allowed only once.
     single: BTreeMap<String, usize>,
     /// Position of the instance.
-    place: Option<Place>,
+    place: Option<InstancePosition>,
 }
 
-impl Reader<'_> {
+impl InputReader<'_> {
     fn nodes(&mut self, card: &Card, cards: &mut Cards) -> Result<(), Error> {
         let first = self.content.nodes.len();
         while let Some(row) = cards.row() {
@@ -151,12 +159,12 @@ impl Reader<'_> {
             if words.len() < 2 {
                 return Err(row.error("node", row.text(), "number, x, y, z"));
             }
-            self.content.nodes.push(Node { label, line: row.line as u32, point });
+            self.content.nodes.push(FileNode { label, line: row.line as u32, point });
         }
         if let Some(name) = card.parameter("NSET") {
             let labels = self.content.nodes[first..].iter();
-            let entries = labels.map(|node| (node.line as usize, Entry::Label(node.label))).collect();
-            self.sets.push(Set { name: name.to_owned(), of: SetKind::Nodes, entries });
+            let entries = labels.map(|node| (node.line as usize, SetEntry::Label(node.label))).collect();
+            self.sets.push(FileSet { name: name.to_owned(), of: SetKind::Nodes, entries });
         }
         Ok(())
     }
@@ -199,13 +207,13 @@ impl Reader<'_> {
             }
             let first = self.content.element_nodes.len();
             self.content.element_nodes.extend_from_slice(&labels[1..=count]);
-            self.content.elements.push(Element { label: labels[0], line: line as u32, kind, first });
+            self.content.elements.push(FileElement { label: labels[0], line: line as u32, kind, first });
         }
         if let Some(name) = card.parameter("ELSET") {
             let labels = self.content.elements[first..].iter();
             let entries =
-                labels.map(|element| (element.line as usize, Entry::Label(element.label))).collect();
-            self.sets.push(Set { name: name.to_owned(), of: SetKind::Elements, entries });
+                labels.map(|element| (element.line as usize, SetEntry::Label(element.label))).collect();
+            self.sets.push(FileSet { name: name.to_owned(), of: SetKind::Elements, entries });
         }
         Ok(())
     }
@@ -219,7 +227,7 @@ impl Reader<'_> {
         let mut of = of;
         if let (SetKind::Nodes, Some(elements)) = (of, card.parameter("ELSET")) {
             of = SetKind::NodesOfElements;
-            entries.push((card.line, Entry::Set(elements.to_owned())));
+            entries.push((card.line, SetEntry::Set(elements.to_owned())));
         }
         let generate = card.parameter("GENERATE").is_some();
         while let Some(row) = cards.row() {
@@ -235,12 +243,12 @@ impl Reader<'_> {
                 if range[2] == 0 || range[0] > range[1] {
                     return Err(row.error("range", row.text(), "first ≤ last, step 1 or more"));
                 }
-                entries.push((row.line, Entry::Range(range)));
+                entries.push((row.line, SetEntry::Range(range)));
             } else {
-                entries.extend(words.iter().map(|word| (row.line, Entry::parse(word))));
+                entries.extend(words.iter().map(|word| (row.line, SetEntry::parse(word))));
             }
         }
-        self.sets.push(Set { name: name.to_owned(), of, entries });
+        self.sets.push(FileSet { name: name.to_owned(), of, entries });
         Ok(())
     }
 
@@ -260,7 +268,7 @@ impl Reader<'_> {
             let Some(first) = words.first() else { continue };
             if nodes {
                 // the second column is an area
-                entries.push((row.line, Entry::parse(first)));
+                entries.push((row.line, SetEntry::parse(first)));
                 continue;
             }
             let side = words.get(1).map_or("", |word| *word).to_uppercase();
@@ -275,15 +283,15 @@ impl Reader<'_> {
                     ));
                 }
             };
-            entries.push((row.line, Entry::Side(Box::new(Entry::parse(first)), side)));
+            entries.push((row.line, SetEntry::Side(Box::new(SetEntry::parse(first)), side)));
         }
         let of = if nodes { SetKind::Nodes } else { SetKind::Faces };
-        self.sets.push(Set { name: name.to_owned(), of, entries });
+        self.sets.push(FileSet { name: name.to_owned(), of, entries });
         Ok(())
     }
 
     /// Checks that there is one part with one instance, so that numbers are unique.
-    fn once(&mut self, card: &Card) -> Result<(), Error> {
+    fn check_single(&mut self, card: &Card) -> Result<(), Error> {
         let Some(line) = self.single.insert(card.keyword.clone(), card.line) else { return Ok(()) };
         let allowed = "one: write the deck without parts and assemblies (Abaqus/CAE: Model, Edit Attributes)";
         let found = format!("*{}, after that of line {line}", card.keyword);

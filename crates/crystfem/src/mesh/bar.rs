@@ -1,8 +1,8 @@
 //! Printed bar on its substrate, Fig. 4.2 of the thesis.
 
 use crate::error::Error;
-use crate::mesh::structured::{MAX_NODES, count as fill, few_enough};
-use crate::mesh::{Block, Face, Grid, Mesh, Split, graded};
+use crate::mesh::structured::{MAX_NODES, check_node_count, count as fill};
+use crate::mesh::{Block, CellSplit, Face, Grid, Mesh, graded};
 
 /// A bar printed in layers, with its lower face at z = 0 and its centre at x = y = 0.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,7 +20,7 @@ pub struct Bar {
     /// Substrate; `None` for a bar alone.
     pub substrate: Option<Substrate>,
     /// Element type.
-    pub cells: Split,
+    pub cells: CellSplit,
 }
 
 /// A plate below the bar, with its upper face at z = 0.
@@ -37,7 +37,7 @@ pub struct Substrate {
 impl Bar {
     /// Returns a bar alone, m: two elements through a layer, hexahedra about two layer heights long.
     pub fn new(size: [f64; 2], layers: usize, layer_height: f64) -> Self {
-        let (elements_per_layer, element_size, cells) = (2, 2.0 * layer_height, Split::Hexahedra);
+        let (elements_per_layer, element_size, cells) = (2, 2.0 * layer_height, CellSplit::Hexahedra);
         Self { size, layers, layer_height, elements_per_layer, element_size, substrate: None, cells }
     }
 
@@ -120,7 +120,7 @@ impl Bar {
             let step = self.layer_height / self.elements_per_layer as f64;
             elements[2] += fill(substrate.thickness, step, substrate.growth)?;
         }
-        few_enough(elements)?;
+        check_node_count(elements)?;
         Ok(elements)
     }
 
@@ -137,7 +137,7 @@ impl Bar {
             if let Some(substrate) = &self.substrate {
                 let beside = 0.5 * (substrate.size[d] - self.size[d]);
                 if beside > 1e-9 * substrate.size[d] {
-                    let outside = away(half, graded(beside, lengths[0], substrate.growth)?);
+                    let outside = end_points(half, graded(beside, lengths[0], substrate.growth)?);
                     let left = outside.iter().rev().map(|x| -x);
                     line = left.chain(line).chain(outside.iter().copied()).collect();
                 }
@@ -147,7 +147,7 @@ impl Bar {
         let step = self.elements_per_layer as f64;
         if let Some(substrate) = &self.substrate {
             let below = graded(substrate.thickness, self.layer_height / step, substrate.growth)?;
-            lines[2].extend(away(0.0, below).into_iter().rev().map(|z| -z));
+            lines[2].extend(end_points(0.0, below).into_iter().rev().map(|z| -z));
         }
         // layer faces are computed like the bounds of the layers' blocks
         lines[2].extend((0..=self.layers * self.elements_per_layer).map(|k| {
@@ -159,7 +159,7 @@ impl Bar {
 }
 
 /// Ends of elements of the given lengths, from `start` on.
-fn away(start: f64, lengths: Vec<f64>) -> Vec<f64> {
+fn end_points(start: f64, lengths: Vec<f64>) -> Vec<f64> {
     let mut end = start;
     lengths
         .into_iter()
@@ -183,7 +183,7 @@ mod tests {
             elements_per_layer: 2,
             element_size: 5e-4,
             substrate: Some(Substrate { size: [0.04, 0.02], thickness: 4e-3, growth: 1.4 }),
-            cells: Split::Hexahedra,
+            cells: CellSplit::Hexahedra,
         }
     }
 
@@ -225,7 +225,7 @@ mod tests {
 
     #[test]
     fn a_bar_of_tetrahedra() {
-        let mesh = Bar { cells: Split::SixTetrahedra, ..bar() }.mesh().unwrap();
+        let mesh = Bar { cells: CellSplit::SixTetrahedra, ..bar() }.mesh().unwrap();
         let quality = quality::check(&mesh, None).unwrap();
         let exact = 0.02 * 0.004 * 8.0 * 2e-4 + 0.04 * 0.02 * 4e-3;
         assert!((quality.volume / exact - 1.0).abs() < 1e-12);
@@ -235,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_printed_is_named() {
+    fn invalid_bars_are_refused() {
         let refused = |bar: Bar, words: &str| {
             let text = bar.mesh().unwrap_err().to_string();
             assert!(text.contains(words), "{text}");

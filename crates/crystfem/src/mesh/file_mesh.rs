@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::error::Error;
 use crate::file::line_error;
 use crate::mesh::quality::{self, Quality};
-use crate::mesh::{Cell, Face, Mesh, Shape};
+use crate::mesh::{Cell, ElementShape, Face, Mesh};
 
 /// A checked mesh from a file.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,8 +26,8 @@ pub struct ReadMesh {
 
 /// Element kinds in files: solids, and kinds that only name faces and nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
-    Solid(Shape),
+pub(super) enum ElementKind {
+    Solid(ElementShape),
     Quadrangle,
     Triangle,
     /// Quadrangle with mid-edge nodes.
@@ -38,7 +38,7 @@ pub(super) enum Kind {
     Point,
 }
 
-impl Kind {
+impl ElementKind {
     pub fn node_count(self) -> usize {
         match self {
             Self::Solid(shape) => shape.nodes(),
@@ -52,7 +52,7 @@ impl Kind {
     }
 
     /// Element type of a solid.
-    pub fn solid(self) -> Option<Shape> {
+    pub fn solid(self) -> Option<ElementShape> {
         if let Self::Solid(shape) = self { Some(shape) } else { None }
     }
 
@@ -68,17 +68,17 @@ impl Kind {
 
 /// An element of a file.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Element {
+pub(super) struct FileElement {
     pub label: u64,
     pub line: u32,
-    pub kind: Kind,
+    pub kind: ElementKind,
     /// Index of its first node in [`FileContent::element_nodes`]; the kind gives their number.
     pub first: usize,
 }
 
 /// A node of a file.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Node {
+pub(super) struct FileNode {
     pub label: u64,
     pub line: u32,
     pub point: [f64; 3],
@@ -86,10 +86,10 @@ pub(super) struct Node {
 
 /// Content of a file. Members of sets are indices into `nodes` and `elements`.
 #[derive(Debug, Default)]
-pub(super) struct Content {
-    pub nodes: Vec<Node>,
-    pub elements: Vec<Element>,
-    /// Labels of the nodes of all elements, in the node order of [`Shape`].
+pub(super) struct FileContent {
+    pub nodes: Vec<FileNode>,
+    pub elements: Vec<FileElement>,
+    /// Labels of the nodes of all elements, in the node order of [`ElementShape`].
     pub element_nodes: Vec<u64>,
     pub node_sets: BTreeMap<String, Vec<u32>>,
     /// Element sets by name; their solids become an element set, their triangles and quadrangles a surface of
@@ -141,9 +141,9 @@ impl Labels {
     }
 }
 
-impl Content {
+impl FileContent {
     /// Labels of an element's nodes.
-    pub fn nodes_of(&self, element: &Element) -> &[u64] {
+    pub fn nodes_of(&self, element: &FileElement) -> &[u64] {
         &self.element_nodes[element.first..element.first + element.kind.node_count()]
     }
 
@@ -184,8 +184,8 @@ impl Content {
         let mut number = vec![u32::MAX; self.elements.len()];
         let mut facets: Vec<([u32; 4], u32)> = Vec::new();
         let list = |shape| match shape {
-            Shape::Hexahedron => 0,
-            Shape::Tetrahedron => 1,
+            ElementShape::Hexahedron => 0,
+            ElementShape::Tetrahedron => 1,
             _ => 2,
         };
         for (place, element) in self.elements.iter().enumerate() {
@@ -201,8 +201,8 @@ impl Content {
                 number[place] = labels.len() as u32;
                 labels.push(element.label);
                 match shape {
-                    Shape::Hexahedron => mesh.hexahedra.extend(own.first_chunk::<8>()),
-                    Shape::Tetrahedron => mesh.tetrahedra.extend(own.first_chunk::<4>()),
+                    ElementShape::Hexahedron => mesh.hexahedra.extend(own.first_chunk::<8>()),
+                    ElementShape::Tetrahedron => mesh.tetrahedra.extend(own.first_chunk::<4>()),
                     _ => mesh.others.extend(Cell::new(&own[..shape.nodes()])),
                 }
             } else if let Some(corners) = element.kind.facet() {

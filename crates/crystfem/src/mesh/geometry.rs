@@ -1,7 +1,7 @@
 //! Positions and volumes of the elements of a mesh.
 
 use super::Mesh;
-use crate::element::{Geometry, MOST, WIDE, WIDE_POINTS};
+use crate::element::{FIRST_ORDER_NODES, Geometry, MAX_ELEMENT_NODES, MAX_ELEMENT_POINTS};
 use polycore::numerics::bounds;
 
 /// Corners of the bounding box of positions, m; `None` without any.
@@ -22,20 +22,20 @@ impl Mesh {
     }
 
     /// Computes an element of any shape at its integration points; `None` if a Jacobian is not positive.
-    pub(crate) fn geometry(&self, element: u32) -> Option<Geometry<WIDE, WIDE_POINTS>> {
-        let (places, nodes) = self.positions::<WIDE>(element);
+    pub(crate) fn geometry(&self, element: u32) -> Option<Geometry<MAX_ELEMENT_NODES, MAX_ELEMENT_POINTS>> {
+        let (places, nodes) = self.positions::<MAX_ELEMENT_NODES>(element);
         Geometry::new(&places[..nodes])
     }
 
     /// Positive fraction of an element's volume for each of its nodes, for means over nodes, m³: ∫ N dV; for
     /// second-order elements, whose ∫ N dV is negative at corners, V ∫ N² dV over the sum of all (Hinton,
     /// Rock & Zienkiewicz 1976). `None` if a Jacobian is not positive.
-    pub(crate) fn node_volumes(&self, element: u32) -> Option<[f64; WIDE]> {
-        let mut volumes = [0.0; WIDE];
-        let (places, nodes) = self.positions::<WIDE>(element);
-        if nodes <= MOST {
-            let geometry = Geometry::<MOST, MOST>::new(&places[..nodes])?;
-            volumes[..MOST].copy_from_slice(&geometry.corner_volumes);
+    pub(crate) fn node_volumes(&self, element: u32) -> Option<[f64; MAX_ELEMENT_NODES]> {
+        let mut volumes = [0.0; MAX_ELEMENT_NODES];
+        let (places, nodes) = self.positions::<MAX_ELEMENT_NODES>(element);
+        if nodes <= FIRST_ORDER_NODES {
+            let geometry = Geometry::<FIRST_ORDER_NODES, FIRST_ORDER_NODES>::new(&places[..nodes])?;
+            volumes[..FIRST_ORDER_NODES].copy_from_slice(&geometry.corner_volumes);
             return Some(volumes);
         }
         let geometry = self.geometry(element)?;

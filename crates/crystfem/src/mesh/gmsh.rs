@@ -8,11 +8,11 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::error::Error;
-use crate::mesh::Shape;
-use crate::mesh::file_mesh::{Content, Element, Kind, Labels, Node, ReadMesh};
+use crate::mesh::ElementShape;
+use crate::mesh::file_mesh::{ElementKind, FileContent, FileElement, FileNode, Labels, ReadMesh};
 
 mod numbers;
-mod two;
+mod version2;
 
 use numbers::{Numbers, Version};
 
@@ -37,8 +37,8 @@ pub fn read(path: &Path, scale: f64) -> Result<ReadMesh, Error> {
 /// # Errors
 /// Errors of [`read`].
 pub fn parse(path: &Path, bytes: &[u8], scale: f64) -> Result<ReadMesh, Error> {
-    let mut reader = Reader {
-        content: Content::default(),
+    let mut reader = MshReader {
+        content: FileContent::default(),
         names: BTreeMap::new(),
         groups: BTreeMap::new(),
         members: bytes.len().saturating_mul(16),
@@ -51,8 +51,8 @@ pub fn parse(path: &Path, bytes: &[u8], scale: f64) -> Result<ReadMesh, Error> {
     while let Some(section) = numbers.section()? {
         match section.as_str() {
             "PhysicalNames" => reader.physical_names(&mut numbers)?,
-            "Nodes" if reader.version == Version::Two => reader.nodes_of_two(&mut numbers)?,
-            "Elements" if reader.version == Version::Two => reader.elements_of_two(&mut numbers)?,
+            "Nodes" if reader.version == Version::Two => reader.nodes_version2(&mut numbers)?,
+            "Elements" if reader.version == Version::Two => reader.elements_version2(&mut numbers)?,
             "Entities" => reader.entities(&mut numbers)?,
             "Nodes" => reader.nodes(&mut numbers)?,
             "Elements" => reader.elements(&mut numbers)?,
@@ -83,8 +83,8 @@ pub fn parse(path: &Path, bytes: &[u8], scale: f64) -> Result<ReadMesh, Error> {
     reader.content.into_mesh(path, &nodes, scale)
 }
 
-struct Reader {
-    content: Content,
+struct MshReader {
+    content: FileContent,
     /// Name of a physical group by dimension and tag.
     names: BTreeMap<(i64, i64), String>,
     /// Physical groups of an entity by dimension and tag.
@@ -97,30 +97,30 @@ struct Reader {
 }
 
 /// Element kinds by their number in the format.
-const KINDS: [(i64, Kind); 16] = [
-    (1, Kind::Line),
-    (2, Kind::Triangle),
-    (3, Kind::Quadrangle),
-    (4, Kind::Solid(Shape::Tetrahedron)),
-    (5, Kind::Solid(Shape::Hexahedron)),
-    (6, Kind::Solid(Shape::Wedge)),
-    (8, Kind::Line3),
-    (9, Kind::Triangle6),
-    (11, Kind::Solid(Shape::Tetrahedron10)),
-    (15, Kind::Point),
-    (16, Kind::Quadrangle8),
-    (17, Kind::Solid(Shape::Hexahedron20)),
-    (18, Kind::Solid(Shape::Wedge15)),
+const KINDS: [(i64, ElementKind); 16] = [
+    (1, ElementKind::Line),
+    (2, ElementKind::Triangle),
+    (3, ElementKind::Quadrangle),
+    (4, ElementKind::Solid(ElementShape::Tetrahedron)),
+    (5, ElementKind::Solid(ElementShape::Hexahedron)),
+    (6, ElementKind::Solid(ElementShape::Wedge)),
+    (8, ElementKind::Line3),
+    (9, ElementKind::Triangle6),
+    (11, ElementKind::Solid(ElementShape::Tetrahedron10)),
+    (15, ElementKind::Point),
+    (16, ElementKind::Quadrangle8),
+    (17, ElementKind::Solid(ElementShape::Hexahedron20)),
+    (18, ElementKind::Solid(ElementShape::Wedge15)),
     // of complete second order
-    (10, Kind::Quadrangle8),
-    (12, Kind::Solid(Shape::Hexahedron20)),
-    (13, Kind::Solid(Shape::Wedge15)),
+    (10, ElementKind::Quadrangle8),
+    (12, ElementKind::Solid(ElementShape::Hexahedron20)),
+    (13, ElementKind::Solid(ElementShape::Wedge15)),
 ];
 
 /// Additional nodes of elements of complete second order: quadrangles, hexahedra, prisms.
-const MORE: [(i64, usize); 3] = [(10, 1), (12, 7), (13, 3)];
+const EXTRA_NODES: [(i64, usize); 3] = [(10, 1), (12, 7), (13, 3)];
 
-impl Reader {
+impl MshReader {
     /// Reads `count`, then lines of dimension, tag and "name"; text in binary files too.
     fn physical_names(&mut self, numbers: &mut Numbers) -> Result<(), Error> {
         let line = numbers.text_line();
@@ -193,17 +193,17 @@ impl Reader {
             let own = numbers.size("number of nodes")?;
             if self.version == Version::Four {
                 for _ in 0..own {
-                    let (label, point) = (whole(numbers, "number of a node")?, place(numbers)?);
+                    let (label, point) = (read_label(numbers, "number of a node")?, place(numbers)?);
                     for _ in 0..parameters {
                         numbers.double("parametric coordinate")?;
                     }
-                    self.content.nodes.push(Node { label, line: numbers.line(), point });
+                    self.content.nodes.push(FileNode { label, line: numbers.line(), point });
                 }
                 continue;
             }
             for _ in 0..own {
                 let label = numbers.size("number of a node")?;
-                self.content.nodes.push(Node { label, line: numbers.line(), point: [0.0; 3] });
+                self.content.nodes.push(FileNode { label, line: numbers.line(), point: [0.0; 3] });
             }
             for node in first..self.content.nodes.len() {
                 self.content.nodes[node].point = place(numbers)?;
@@ -229,8 +229,10 @@ impl Reader {
             let first = self.content.elements.len();
             for _ in 0..numbers.size("number of elements")? {
                 if self.version == Version::Four {
-                    let label = whole(numbers, "number of an element")?;
-                    self.element(numbers, label, code, kind, |numbers| whole(numbers, "node of an element"))?;
+                    let label = read_label(numbers, "number of an element")?;
+                    self.element(numbers, label, code, kind, |numbers| {
+                        read_label(numbers, "node of an element")
+                    })?;
                 } else {
                     let label = numbers.size("number of an element")?;
                     self.element(numbers, label, code, kind, |numbers| numbers.size("node of an element"))?;
@@ -272,14 +274,14 @@ impl Reader {
         numbers: &mut Numbers,
         label: u64,
         code: i64,
-        kind: Kind,
+        kind: ElementKind,
         node: impl Fn(&mut Numbers) -> Result<u64, Error>,
     ) -> Result<(), Error> {
         let mut nodes = [0; 20];
         for own in &mut nodes[..kind.node_count()] {
             *own = node(numbers)?;
         }
-        let more = MORE.iter().find(|more| more.0 == code).map_or(0, |more| more.1);
+        let more = EXTRA_NODES.iter().find(|more| more.0 == code).map_or(0, |more| more.1);
         for _ in 0..more {
             node(numbers)?;
         }
@@ -290,7 +292,7 @@ impl Reader {
             Some(shape) => all.extend(shape.gmsh().iter().map(|&place| nodes[place])),
             None => all.extend(&nodes[..kind.node_count()]),
         }
-        self.content.elements.push(Element { label, line: numbers.line(), kind, first });
+        self.content.elements.push(FileElement { label, line: numbers.line(), kind, first });
         Ok(())
     }
 
@@ -318,9 +320,9 @@ impl Reader {
 
     /// Builds node sets of the groups of points, curves and surfaces.
     fn name_nodes(&mut self, nodes: &Labels) {
-        let Content { elements, element_nodes, element_sets, node_sets, .. } = &mut self.content;
+        let FileContent { elements, element_nodes, element_sets, node_sets, .. } = &mut self.content;
         element_sets.retain(|name, places| {
-            let low = |kind: Kind| kind.solid().is_none();
+            let low = |kind: ElementKind| kind.solid().is_none();
             let members = places.iter().map(|place| &elements[*place as usize]);
             let set: Vec<u32> = members
                 .clone()
@@ -332,13 +334,15 @@ impl Reader {
                 node_sets.entry(name.clone()).or_default().extend(set);
             }
             // nothing else remains of curves and points
-            members.into_iter().any(|element| !matches!(element.kind, Kind::Line | Kind::Line3 | Kind::Point))
+            members.into_iter().any(|element| {
+                !matches!(element.kind, ElementKind::Line | ElementKind::Line3 | ElementKind::Point)
+            })
         });
     }
 }
 
 /// Returns the kind of an element type.
-fn kind_of(numbers: &Numbers, code: i64) -> Result<Kind, Error> {
+fn kind_of(numbers: &Numbers, code: i64) -> Result<ElementKind, Error> {
     KINDS.iter().find(|kind| kind.0 == code).map(|kind| kind.1).ok_or_else(|| {
         let pyramids = if matches!(code, 7 | 14 | 19) { " (pyramids are none)" } else { "" };
         let allowed = format!(
@@ -362,7 +366,7 @@ fn place(numbers: &mut Numbers) -> Result<[f64; 3], Error> {
 }
 
 /// Reads a label of a node or an element stored in four bytes.
-fn whole(numbers: &mut Numbers, what: &str) -> Result<u64, Error> {
+fn read_label(numbers: &mut Numbers, what: &str) -> Result<u64, Error> {
     let number = numbers.int(what)?;
     u64::try_from(number).map_err(|_| numbers.error(what, number, "0 or more"))
 }

@@ -184,7 +184,7 @@ pub fn groups(activation: &[f64], window: f64) -> Result<Vec<(f64, Vec<u32>)>, E
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::{Bar, Block, Grid, Split, Substrate};
+    use crate::mesh::{Bar, Block, CellSplit, Grid, Substrate};
 
     fn bar() -> Mesh {
         let substrate = Substrate { size: [0.03, 0.01], thickness: 1e-3, growth: 1.5 };
@@ -195,7 +195,7 @@ mod tests {
             elements_per_layer: 2,
             element_size: 1e-3,
             substrate: Some(substrate),
-            cells: Split::Hexahedra,
+            cells: CellSplit::Hexahedra,
         };
         bar.mesh().unwrap()
     }
@@ -214,7 +214,7 @@ mod tests {
     fn elements_across_layers_are_noted() {
         let block = Block { name: "brick".into(), lower: [0.0; 3], upper: [1.0; 3] };
         let grid = Grid::uniform([0.0; 3], [1.0; 3], [2, 2, 5]).unwrap();
-        let mesh = grid.blocks(&[block], Split::SixTetrahedra).unwrap();
+        let mesh = grid.blocks(&[block], CellSplit::SixTetrahedra).unwrap();
         let all: Vec<u32> = (0..mesh.element_count() as u32).collect();
         let layers = Layers::from_height(&mesh, &all, 0.2).unwrap();
         assert_eq!((layers.elements.len(), layers.notes.len()), (5, 0));
@@ -224,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_layer_is_named() {
+    fn invalid_layers_are_refused() {
         let mut mesh = bar();
         let printed = mesh.element_sets["bar"].clone();
         let text = |result: Result<Layers, Error>| result.unwrap_err().to_string();

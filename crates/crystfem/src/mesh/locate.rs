@@ -1,26 +1,26 @@
 //! Location of points in a mesh, for interpolation.
 
 use super::Mesh;
-use crate::element::WIDE;
+use crate::element::MAX_ELEMENT_NODES;
 use crate::element::natural::{self, Natural};
-use crate::mesh::Shape;
+use crate::mesh::ElementShape;
 use nalgebra::{Matrix3, Vector3};
 use polycore::numerics::hexahedron;
 
 /// Tolerance in natural coordinates, and in distances over an element's diagonal: a point on a node has its
 /// value.
-const NEAR: f64 = 1e-9;
+const LOCATION_TOLERANCE: f64 = 1e-9;
 /// Enlargement of an element's box for cutting lines, over its longest edge: above rounding, and above
-/// `NEAR`.
-const BOX: f64 = 1e-6;
+/// `LOCATION_TOLERANCE`.
+const BOX_MARGIN: f64 = 1e-6;
 /// Limit on iterations for natural coordinates in a hexahedron; a parallelepiped needs two.
-const MOST_ITERATIONS: usize = 50;
+const MAX_ITERATIONS: usize = 50;
 /// Largest distance outside the mesh, over the element's extent.
-const OUTSIDE: f64 = 0.5;
+const MAX_OUTSIDE: f64 = 0.5;
 
 /// A point in a mesh.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Place {
+pub struct LocatedPoint {
     /// Nodes with their shape functions, if not 0.
     weights: Vec<(u32, f64)>,
     /// Elements that contain the point: one, or all that meet there.
@@ -29,7 +29,7 @@ pub struct Place {
     distance: f64,
 }
 
-impl Place {
+impl LocatedPoint {
     /// Elements that contain the point: one, or all that meet there.
     pub fn elements(&self) -> &[u32] {
         &self.elements
@@ -53,31 +53,31 @@ impl Place {
 
 impl Mesh {
     /// Returns true if a point, m, lies in an element or on its faces.
-    pub fn holds(&self, element: u32, at: [f64; 3]) -> bool {
+    pub fn contains(&self, element: u32, at: [f64; 3]) -> bool {
         self.shapes_at(element, at).is_some()
     }
 
     /// Shape functions of an element's nodes at a point, m; `None` outside the element and its faces.
-    pub fn shapes_at(&self, element: u32, at: [f64; 3]) -> Option<[f64; WIDE]> {
-        let (corners, nodes) = self.positions::<WIDE>(element);
+    pub fn shapes_at(&self, element: u32, at: [f64; 3]) -> Option<[f64; MAX_ELEMENT_NODES]> {
+        let (corners, nodes) = self.positions::<MAX_ELEMENT_NODES>(element);
         let (weights, distance, rounding) = near(corners.get(..nodes).filter(|list| !list.is_empty())?, at)?;
         (distance <= rounding).then_some(weights)
     }
 
     /// Locates a point, m. A point outside, by at most half an element's extent along each axis, is moved
     /// into the nearest element; `None` beyond.
-    pub fn locate(&self, at: [f64; 3]) -> Option<Place> {
+    pub fn locate(&self, at: [f64; 3]) -> Option<LocatedPoint> {
         self.locate_in(0..self.element_count() as u32, at)
     }
 
     /// Locates points in order along the line from `a` to `b`; `None` for points outside the mesh.
-    pub fn locate_along(&self, a: [f64; 3], b: [f64; 3], points: &[[f64; 3]]) -> Vec<Option<Place>> {
+    pub fn locate_along(&self, a: [f64; 3], b: [f64; 3], points: &[[f64; 3]]) -> Vec<Option<LocatedPoint>> {
         let along = [0, 1, 2].map(|d| b[d] - a[d]);
         let square: f64 = along.iter().map(|x| x * x).sum();
         // interval of the line in each element's slightly enlarged box
         let part = |element: u32| {
             let [low, high] = self.bounds_of(&[element])?;
-            let around = BOX * (0..3).map(|d| high[d] - low[d]).fold(0.0, f64::max);
+            let around = BOX_MARGIN * (0..3).map(|d| high[d] - low[d]).fold(0.0, f64::max);
             let (mut first, mut last) = (f64::NEG_INFINITY, f64::INFINITY);
             for d in 0..3 {
                 let ends = [low[d] - around - a[d], high[d] + around - a[d]];
@@ -109,10 +109,10 @@ impl Mesh {
         points.iter().map(locate).collect()
     }
 
-    fn locate_in(&self, elements: impl Iterator<Item = u32>, at: [f64; 3]) -> Option<Place> {
-        let mut found: Vec<(u32, [f64; WIDE], f64, f64)> = Vec::new();
+    fn locate_in(&self, elements: impl Iterator<Item = u32>, at: [f64; 3]) -> Option<LocatedPoint> {
+        let mut found: Vec<(u32, [f64; MAX_ELEMENT_NODES], f64, f64)> = Vec::new();
         for number in elements {
-            let (corners, nodes) = self.positions::<WIDE>(number);
+            let (corners, nodes) = self.positions::<MAX_ELEMENT_NODES>(number);
             let corners = &corners[..nodes];
             if let Some((weights, distance, rounding)) = near(corners, at) {
                 found.push((number, weights, distance, rounding));
@@ -120,7 +120,7 @@ impl Mesh {
         }
         let &(nearest, weights, distance, rounding) = found.iter().min_by(|a, b| a.2.total_cmp(&b.2))?;
         let meets = |(_, _, other, rounding): &&(u32, _, f64, f64)| *other <= distance + rounding;
-        Some(Place {
+        Some(LocatedPoint {
             weights: self
                 .nodes(nearest)
                 .iter()
@@ -136,33 +136,33 @@ impl Mesh {
 
 /// Shape functions at the nearest point in an element, the distance to it and the rounding error of that, m;
 /// `None` for a point outside by more than half of the element's box.
-fn near(corners: &[[f64; 3]], at: [f64; 3]) -> Option<([f64; WIDE], f64, f64)> {
+fn near(corners: &[[f64; 3]], at: [f64; 3]) -> Option<([f64; MAX_ELEMENT_NODES], f64, f64)> {
     let near = (0..3).all(|d| {
         let ends = corners.iter().map(|corner| corner[d]);
         let (low, high) = (ends.clone().fold(f64::MAX, f64::min), ends.fold(f64::MIN, f64::max));
-        let around = OUTSIDE * (high - low);
+        let around = MAX_OUTSIDE * (high - low);
         (low - around..=high + around).contains(&at[d])
     });
     if !near {
         return None;
     }
-    let weights = match (corners.len(), Shape::of(corners.len())) {
-        (8, _) => in_hexahedron(corners, at),
-        (4, _) => in_tetrahedron(corners, at),
-        (_, shape) => in_other(shape?, corners, at),
+    let weights = match (corners.len(), ElementShape::with_nodes(corners.len())) {
+        (8, _) => hexahedron_shapes(corners, at),
+        (4, _) => tetrahedron_shapes(corners, at),
+        (_, shape) => general_shapes(shape?, corners, at),
     };
     let origin = Vector3::from(corners[0]);
     let offset = |corner: &[f64; 3]| Vector3::from(*corner) - origin;
     let reached: Vector3<f64> = corners.iter().zip(weights).map(|(c, weight)| weight * offset(c)).sum();
     let diagonal = corners.iter().map(|corner| offset(corner).norm()).fold(0.0, f64::max);
-    Some((weights, (offset(&at) - reached).norm(), NEAR * diagonal))
+    Some((weights, (offset(&at) - reached).norm(), LOCATION_TOLERANCE * diagonal))
 }
 
 /// Shape functions of a hexahedron at natural coordinates, clamped to the element.
-fn of_hexahedron(natural: Vector3<f64>) -> [f64; WIDE] {
+fn trilinear_shapes(natural: Vector3<f64>) -> [f64; MAX_ELEMENT_NODES] {
     // exact at the ends: a node has weight 1, and those across a face have 0
-    let natural = natural.map(|x| if x.abs() > 1.0 - NEAR { x.signum() } else { x });
-    let mut weights = [0.0; WIDE];
+    let natural = natural.map(|x| if x.abs() > 1.0 - LOCATION_TOLERANCE { x.signum() } else { x });
+    let mut weights = [0.0; MAX_ELEMENT_NODES];
     weights[..8].copy_from_slice(&hexahedron::shapes(natural.into()));
     weights
 }
@@ -170,11 +170,11 @@ fn of_hexahedron(natural: Vector3<f64>) -> [f64; WIDE] {
 /// Shape functions of wedges and second-order elements, by Newton's method from the centre, with natural
 /// coordinates clamped to the element. Near a curved face the nearest point is that of the nearest natural
 /// coordinates.
-fn in_other(shape: Shape, corners: &[[f64; 3]], at: [f64; 3]) -> [f64; WIDE] {
+fn general_shapes(shape: ElementShape, corners: &[[f64; 3]], at: [f64; 3]) -> [f64; MAX_ELEMENT_NODES] {
     let offset = |place: [f64; 3]| Vector3::from(place) - Vector3::from(corners[0]);
     let mut place = Vector3::from(natural::middle(shape));
-    for _ in 0..MOST_ITERATIONS {
-        let natural = Natural::at(shape, place.into());
+    for _ in 0..MAX_ITERATIONS {
+        let natural = Natural::new(shape, place.into());
         let (mut left, mut jacobian) = (offset(at), Matrix3::<f64>::zeros());
         for (a, corner) in corners.iter().enumerate() {
             left -= natural.shapes[a] * offset(*corner);
@@ -187,12 +187,12 @@ fn in_other(shape: Shape, corners: &[[f64; 3]], at: [f64; 3]) -> [f64; WIDE] {
         }
     }
     // exact at the ends, so that a node has weight 1
-    let ends = |x: f64| if x.abs() > 1.0 - NEAR { x.signum() } else { x };
+    let ends = |x: f64| if x.abs() > 1.0 - LOCATION_TOLERANCE { x.signum() } else { x };
     // barycentric coordinates, clamped at 0
     let simplex = |count: usize, place: Vector3<f64>| {
         let mut own = [1.0 - place.iter().take(count).sum::<f64>(), place[0], place[1], place[2]];
         own[count + 1..].fill(0.0);
-        let own = own.map(|x| if x > NEAR { x } else { 0.0 });
+        let own = own.map(|x| if x > LOCATION_TOLERANCE { x } else { 0.0 });
         let sum: f64 = own.iter().sum();
         own.map(|x| x / sum)
     };
@@ -207,14 +207,14 @@ fn in_other(shape: Shape, corners: &[[f64; 3]], at: [f64; 3]) -> [f64; WIDE] {
             Vector3::new(r, s, ends(place[2]))
         }
     };
-    Natural::at(shape, place.into()).shapes
+    Natural::new(shape, place.into()).shapes
 }
 
 /// Inverts x(ξ) = Σ N_a(ξ) x_a by Newton's method from the centre.
-fn in_hexahedron(corners: &[[f64; 3]], at: [f64; 3]) -> [f64; WIDE] {
+fn hexahedron_shapes(corners: &[[f64; 3]], at: [f64; 3]) -> [f64; MAX_ELEMENT_NODES] {
     let offset = |place: [f64; 3]| Vector3::from(place) - Vector3::from(corners[0]);
     let mut natural = Vector3::<f64>::zeros();
-    for _ in 0..MOST_ITERATIONS {
+    for _ in 0..MAX_ITERATIONS {
         let (mut left, mut jacobian) = (offset(at), Matrix3::<f64>::zeros());
         let (shapes, slopes) = (hexahedron::shapes(natural.into()), hexahedron::slopes(natural.into()));
         for ((corner, shape), slope) in corners.iter().zip(shapes).zip(slopes) {
@@ -228,18 +228,18 @@ fn in_hexahedron(corners: &[[f64; 3]], at: [f64; 3]) -> [f64; WIDE] {
             break;
         }
     }
-    of_hexahedron(natural)
+    trilinear_shapes(natural)
 }
 
 /// Barycentric coordinates, clamped at 0.
-fn in_tetrahedron(corners: &[[f64; 3]], at: [f64; 3]) -> [f64; WIDE] {
+fn tetrahedron_shapes(corners: &[[f64; 3]], at: [f64; 3]) -> [f64; MAX_ELEMENT_NODES] {
     let offset = |place: [f64; 3]| Vector3::from(place) - Vector3::from(corners[0]);
     let edges = Matrix3::from_columns(&[offset(corners[1]), offset(corners[2]), offset(corners[3])]);
     let natural = edges.try_inverse().unwrap_or_default() * offset(at);
-    let mut weights = [0.0; WIDE];
+    let mut weights = [0.0; MAX_ELEMENT_NODES];
     weights[0] = 1.0 - natural.sum();
     weights[1..4].copy_from_slice(natural.as_slice());
-    let weights = weights.map(|weight| if weight > NEAR { weight } else { 0.0 });
+    let weights = weights.map(|weight| if weight > LOCATION_TOLERANCE { weight } else { 0.0 });
     let sum: f64 = weights.iter().sum();
     weights.map(|weight| weight / sum)
 }
@@ -247,7 +247,7 @@ fn in_tetrahedron(corners: &[[f64; 3]], at: [f64; 3]) -> [f64; WIDE] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::{Block, Grid, Split};
+    use crate::mesh::{Block, CellSplit, Grid};
 
     fn meshes() -> [Mesh; 7] {
         let grid = Grid::uniform([0.0; 3], [3.0, 2.0, 1.0], [5, 3, 2]).unwrap();
@@ -256,7 +256,7 @@ mod tests {
         let distorted = hexahedra.distorted(0.05).unwrap();
         let blocks = [block];
         let [tetrahedra, wedges] =
-            [Split::FiveTetrahedra, Split::Wedges].map(|split| grid.blocks(&blocks, split).unwrap());
+            [CellSplit::FiveTetrahedra, CellSplit::Wedges].map(|split| grid.blocks(&blocks, split).unwrap());
         let others = [hexahedra.clone(), tetrahedra.clone(), wedges.distorted(0.02).unwrap()];
         let [h20, t10, w15] = others.map(Mesh::second_order);
         [hexahedra, distorted, tetrahedra, wedges, h20, t10, w15]
@@ -299,7 +299,7 @@ mod tests {
     /// Points along lines through nodes, in faces, oblique and past the mesh agree with `locate`, elements
     /// included.
     #[test]
-    fn lines_find_what_single_places_find() {
+    fn lines_agree_with_single_points() {
         for mesh in meshes() {
             for (a, b) in [
                 ([0.0; 3], [3.0, 2.0, 1.0]),

@@ -7,10 +7,10 @@ mod geometry;
 pub mod gmsh;
 pub mod layers;
 mod locate;
-mod order;
 pub mod path;
 pub mod quality;
 mod read;
+mod second_order;
 mod split;
 pub mod stl;
 mod structured;
@@ -24,13 +24,13 @@ use nalgebra::Vector3;
 
 use crate::error::Error;
 
-pub use crate::shape::{Cell, HEXAHEDRON_SIDES, Shape, TETRAHEDRON_SIDES};
+pub use crate::shape::{Cell, ElementShape, HEXAHEDRON_SIDES, TETRAHEDRON_SIDES};
 pub use bar::{Bar, Substrate};
 pub use file_mesh::ReadMesh;
 pub(crate) use geometry::box_around;
-pub use locate::Place;
+pub use locate::LocatedPoint;
 pub use read::read;
-pub use split::Split;
+pub use split::CellSplit;
 pub use structured::{Block, Grid, graded};
 pub use tube::Tube;
 pub use voxels::{RATIOS, Voxels};
@@ -46,7 +46,7 @@ pub struct Face {
 }
 
 /// A mesh. Elements are numbered 8-node hexahedra first, then 4-node tetrahedra, then the others; nodes of an
-/// element are in the order of Abaqus ([`Shape`]).
+/// element are in the order of Abaqus ([`ElementShape`]).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
     /// Positions of the nodes, m.
@@ -122,11 +122,11 @@ impl Mesh {
     }
 
     /// Type of an element; tetrahedron for an index out of range.
-    pub fn shape(&self, element: u32) -> Shape {
+    pub fn shape(&self, element: u32) -> ElementShape {
         let element = element as usize;
         match element < self.hexahedra.len() {
-            true => Shape::Hexahedron,
-            false => self.other(element).map_or(Shape::Tetrahedron, |cell| cell.shape),
+            true => ElementShape::Hexahedron,
+            false => self.other(element).map_or(ElementShape::Tetrahedron, |cell| cell.shape),
         }
     }
 
@@ -310,7 +310,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_exist_has_no_nodes() {
+    fn missing_elements_have_no_nodes() {
         let mesh = Grid::uniform([0.0; 3], [1.0; 3], [1, 1, 1]).unwrap().mesh("brick").unwrap();
         assert!(mesh.nodes(1).is_empty());
         assert!(mesh.face_nodes(Face { element: 0, side: 6 }).is_empty());
@@ -319,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn bricks_are_told_by_shape() {
+    fn bricks_are_grouped_by_shape() {
         // lines at k/7 differ in their last bits; the second half along x is twice as long
         let mut grid = Grid::uniform([0.0; 3], [1.0; 3], [7, 7, 7]).unwrap();
         for x in &mut grid.lines[0] {

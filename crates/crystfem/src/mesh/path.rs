@@ -10,6 +10,7 @@ use crate::mesh::Mesh;
 /// Default filament diameter, m.
 pub const FILAMENT: f64 = 1.75e-3;
 
+mod comments;
 mod cover;
 mod csv;
 mod deposit;
@@ -19,15 +20,14 @@ mod gcode;
 mod height;
 mod limits;
 mod line;
-mod place;
-mod plan;
+mod motion_planning;
+mod placement;
 mod printer;
-mod remark;
 mod summary;
 
-pub use cover::{Activation, Bead};
+pub use cover::{ActivationTimes, Bead};
 pub use csv::read_csv;
-pub use deposit::{Cells, Deposit};
+pub use deposit::{CellSettings, Deposit};
 pub use feature::FAMILIES;
 pub use flow::stadium_width;
 pub use gcode::{parse, read_gcode};
@@ -59,7 +59,7 @@ pub struct Move {
 
 /// Straight motion of X, Y, Z and filament, m, at feed rate F.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Motion {
+struct MachineMotion {
     delta: [f64; 4],
     start: f64,
     end: f64,
@@ -69,7 +69,7 @@ struct Motion {
     stop: bool,
 }
 
-impl Motion {
+impl MachineMotion {
     fn length(&self) -> f64 {
         let across = self.delta[..3].iter().map(|x| x * x).sum::<f64>().sqrt();
         if across > 0.0 { across } else { self.delta[3].abs() }
@@ -130,7 +130,7 @@ pub struct ToolPath {
     pub estimate: Option<f64>,
     first: usize,
     /// All motions, including feed-only ones.
-    motions: Vec<Motion>,
+    motions: Vec<MachineMotion>,
     /// Machine limits, in the order of the file.
     limits: Vec<limits::Limits>,
 }
@@ -214,18 +214,23 @@ impl ToolPath {
         self.moves.last().map_or(0.0, |last| last.end) + self.rest
     }
 
-    /// Times at which the bead covers elements, see [`Activation`].
+    /// Times at which the bead covers elements, see [`ActivationTimes`].
     ///
     /// # Errors
     /// [`Error::Parameter`] or [`Error::Mesh`] for a bead without width or height, an element out of range, a
     /// path that prints nothing, and positions or times that are not finite.
-    pub fn activation(&self, mesh: &Mesh, elements: &[u32], bead: Bead) -> Result<Activation, Error> {
+    pub fn activation_times(
+        &self,
+        mesh: &Mesh,
+        elements: &[u32],
+        bead: Bead,
+    ) -> Result<ActivationTimes, Error> {
         cover::activation(self, mesh, elements, bead)
     }
 }
 
 /// Lists names with their counts, most frequent first, at most twenty.
-fn told(counts: &mut BTreeMap<String, usize>) -> String {
+fn list_counts(counts: &mut BTreeMap<String, usize>) -> String {
     let mut all: Vec<(String, usize)> = std::mem::take(counts).into_iter().collect();
     all.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
     let more = all.len().saturating_sub(20);

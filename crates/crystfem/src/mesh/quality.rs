@@ -4,22 +4,22 @@ use nalgebra::Vector3;
 use polycore::numerics::Sets;
 use rayon::prelude::*;
 
-use crate::element::natural::{Natural, Rule, corner};
+use crate::element::natural::{Natural, QuadratureRule, corner};
 use crate::error::Error;
-use crate::mesh::surface::Surface;
+use crate::mesh::surface::OuterSurface;
 use crate::mesh::{Face, Mesh};
 
 /// Smallest accepted scaled Jacobian: det of the three edges at a corner over the product of their lengths, 1
 /// for a brick, 1/√2 for the corner of a regular tetrahedron. Gradients on an element grow with its inverse:
 /// below this bound they lose six of fifteen digits.
-pub const LEAST_SCALED_JACOBIAN: f64 = 1e-6;
+pub const MIN_SCALED_JACOBIAN: f64 = 1e-6;
 
 /// Scaled Jacobian below which a note is made: an angle between an edge and the plane of two others under 3°.
 pub const POOR_SCALED_JACOBIAN: f64 = 0.05;
 
 /// Largest accepted ratio of an element's longest to its shortest edge: conductances of an element scale with
 /// its square, and (10⁷)² leaves two digits of the small one.
-pub const GREATEST_ASPECT: f64 = 1e7;
+pub const MAX_ASPECT: f64 = 1e7;
 
 /// Ratio of edges above which a note is made.
 pub const POOR_ASPECT: f64 = 1e3;
@@ -46,7 +46,7 @@ pub struct Quality {
 /// [`Error::Mesh`] with the element, its centre, the value found and what is allowed: no elements, a node out
 /// of range or repeated in an element, coordinates that are not finite, an inverted element or one without
 /// volume (Jacobian at a corner or at a Gauss point not positive), a scaled Jacobian below
-/// [`LEAST_SCALED_JACOBIAN`], a ratio of edges above [`GREATEST_ASPECT`], a duplicate element, a face of
+/// [`MIN_SCALED_JACOBIAN`], a ratio of edges above [`MAX_ASPECT`], a duplicate element, a face of
 /// three elements, and a set that is empty or has members out of range.
 pub fn check(mesh: &Mesh, labels: Option<&[u64]>) -> Result<Quality, Error> {
     let elements = mesh.element_count();
@@ -55,26 +55,28 @@ pub fn check(mesh: &Mesh, labels: Option<&[u64]>) -> Result<Quality, Error> {
     }
     check_numbers(mesh, labels)?;
     // worst of each work item, then of all in order: the same on any number of threads
-    let items: Vec<Worst> = (0..elements.div_ceil(ITEM))
+    let items: Vec<WorstMeasures> = (0..elements.div_ceil(ITEM))
         .into_par_iter()
-        .map(|item| Worst::of(mesh, (item * ITEM) as u32..((item + 1) * ITEM).min(elements) as u32))
+        .map(|item| {
+            WorstMeasures::measure(mesh, (item * ITEM) as u32..((item + 1) * ITEM).min(elements) as u32)
+        })
         .collect();
-    let worst = items.into_iter().reduce(Worst::and).unwrap_or_default();
+    let worst = items.into_iter().reduce(WorstMeasures::merge).unwrap_or_default();
     let refuse = |(value, element): (f64, u32), what: &str, allowed: String| {
         Err(Error::Mesh(format!("{}: {what} {value:.3e}; allowed: {allowed}", place(mesh, labels, element))))
     };
     if worst.determinant.0.is_nan() || worst.determinant.0 <= 0.0 {
         return refuse(worst.determinant, "inverted or without volume, Jacobian", "above 0 m³".into());
     }
-    if worst.scaled.0.is_nan() || worst.scaled.0 < LEAST_SCALED_JACOBIAN {
+    if worst.scaled.0.is_nan() || worst.scaled.0 < MIN_SCALED_JACOBIAN {
         return refuse(worst.scaled, "sliver, scaled Jacobian", format!("{LEAST_SCALED_JACOBIAN:e} or more"));
     }
-    if worst.aspect.0.is_nan() || worst.aspect.0 > GREATEST_ASPECT {
+    if worst.aspect.0.is_nan() || worst.aspect.0 > MAX_ASPECT {
         return refuse(worst.aspect, "longest over shortest edge", format!("at most {GREATEST_ASPECT:e}"));
     }
     check_twice(mesh, labels)?;
     check_sets(mesh)?;
-    let surface = Surface::of_all(mesh)?;
+    let surface = OuterSurface::of_all(mesh)?;
     let mut notes = Vec::new();
     if worst.scaled.0 < POOR_SCALED_JACOBIAN {
         let (value, element) = worst.scaled;
@@ -135,24 +137,24 @@ const ITEM: usize = 4096;
 
 /// Worst quality measures of some elements; the first element if equal.
 #[derive(Clone, Copy, Debug)]
-struct Worst {
+struct WorstMeasures {
     volume: f64,
     determinant: (f64, u32),
     scaled: (f64, u32),
     aspect: (f64, u32),
 }
 
-impl Default for Worst {
+impl Default for WorstMeasures {
     fn default() -> Self {
         Self { volume: 0.0, determinant: (f64::INFINITY, 0), scaled: (f64::INFINITY, 0), aspect: (0.0, 0) }
     }
 }
 
-impl Worst {
-    fn of(mesh: &Mesh, elements: std::ops::Range<u32>) -> Self {
+impl WorstMeasures {
+    fn measure(mesh: &Mesh, elements: std::ops::Range<u32>) -> Self {
         elements.fold(Self::default(), |worst, element| {
             let [volume, determinant, scaled, aspect] = measures(mesh, element);
-            worst.and(Self {
+            worst.merge(Self {
                 volume,
                 determinant: (determinant, element),
                 scaled: (scaled, element),
@@ -161,7 +163,7 @@ impl Worst {
         })
     }
 
-    fn and(self, next: Self) -> Self {
+    fn merge(self, next: Self) -> Self {
         // NaN counts as the worst
         let least = |a: (f64, u32), b: (f64, u32)| if a.0.is_nan() || a.0 <= b.0 { a } else { b };
         let most = |a: (f64, u32), b: (f64, u32)| if a.0.is_nan() || a.0 >= b.0 { a } else { b };
@@ -214,14 +216,14 @@ fn measures(mesh: &Mesh, element: u32) -> [f64; 4] {
             }
             volume
         }
-        _ => return of_other(mesh, element),
+        _ => return measures_of_other(mesh, element),
     };
     [volume, least[0], least[1], edges[1] / edges[0]]
 }
 
 /// Measures of a wedge or a second-order element, as in [`measures`]: Jacobian at corners and integration
 /// points, and straight edges between corners.
-fn of_other(mesh: &Mesh, element: u32) -> [f64; 4] {
+fn measures_of_other(mesh: &Mesh, element: u32) -> [f64; 4] {
     let shape = mesh.shape(element);
     let x: Vec<Vector3<f64>> = mesh.nodes(element).iter().map(|&node| mesh.point(node)).collect();
     let determinant = |natural: &Natural| {
@@ -233,12 +235,12 @@ fn of_other(mesh: &Mesh, element: u32) -> [f64; 4] {
         }
         columns[0].cross(&columns[1]).dot(&columns[2])
     };
-    let rule = Rule::of(shape);
+    let rule = QuadratureRule::for_shape(shape);
     let own: Vec<f64> = rule.at.iter().map(determinant).collect();
     let volume = own.iter().zip(&rule.weights).map(|(own, weight)| own * weight).sum();
     let mut least = [f64::INFINITY; 2];
     let mut edges = [f64::INFINITY, 0.0f64];
-    let corners = (0..shape.corners()).map(|k| determinant(&Natural::at(shape, corner(shape, k))));
+    let corners = (0..shape.corners()).map(|k| determinant(&Natural::new(shape, corner(shape, k))));
     for found in own.iter().copied().chain(corners) {
         least[0] = if found.is_nan() || least[0].is_nan() { f64::NAN } else { least[0].min(found) };
     }
@@ -375,7 +377,7 @@ fn parts(mesh: &Mesh) -> (usize, usize, usize) {
 
 /// Counts coincident nodes, within 1e-9 of the box's diagonal; returns also the first pair. Only nodes of the
 /// outer surface are compared: faces between duplicate nodes are outer faces.
-fn doubles(mesh: &Mesh, surface: &Surface) -> Option<(usize, [u32; 2])> {
+fn doubles(mesh: &Mesh, surface: &OuterSurface) -> Option<(usize, [u32; 2])> {
     let [lower, upper] = mesh.bounds()?;
     let near = 1e-9 * (Vector3::from(upper) - Vector3::from(lower)).norm();
     let faces: Vec<Face> = surface.faces().collect();
@@ -406,7 +408,7 @@ fn doubles(mesh: &Mesh, surface: &Surface) -> Option<(usize, [u32; 2])> {
 }
 
 /// Finds a hexahedron and a tetrahedron that meet at half a side.
-fn half_faces(mesh: &Mesh, surface: &Surface) -> Option<(u32, u32)> {
+fn half_faces(mesh: &Mesh, surface: &OuterSurface) -> Option<(u32, u32)> {
     let has = |corners: usize| mesh.others.iter().any(|cell| cell.shape.corners() == corners);
     let squares = !mesh.hexahedra.is_empty() || has(8) || has(6);
     let split = !mesh.tetrahedra.is_empty() || has(4) || has(6);

@@ -10,14 +10,14 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use crate::error::Error;
-use crate::mesh::voxels::{Frame, Voxels};
+use crate::mesh::voxels::{VoxelGrid, Voxels};
 
 /// Number of rays per cell along each axis: fill fractions are exact along z and to about 1/8² across.
 const RAYS: usize = 8;
 /// Offset of rays from the centres of their squares, in squares: edges often pass through centres.
-const ASIDE: [f64; 2] = [1.3e-4, 0.7e-4];
+const RAY_OFFSET: [f64; 2] = [1.3e-4, 0.7e-4];
 /// Smallest fraction of the volume, overlapping or inside inward-facing shells, that is reported.
-const TOLD: f64 = 1e-6;
+const MIN_REPORTED: f64 = 1e-6;
 
 /// Closed shells of triangles. The inside is the union of all shells, as in slicers: overlaps count once. An
 /// inward-facing shell inside another one is a cavity.
@@ -79,7 +79,7 @@ pub fn parse(path: &Path, bytes: &[u8], scale: f64) -> Result<Stl, Error> {
     if welded > 0 {
         triangles.iter_mut().for_each(|triangle| *triangle = triangle.map(|n| first[n as usize]));
         triangles.retain(whole);
-        notes.push(format!("{welded} corners closer than 1e-6 of the size to another are one with it"));
+        notes.push(format!("{welded} corners closer than 1e-6 of the size to another are merged"));
     }
     if all > triangles.len() {
         let collapsed = all - thin - triangles.len();
@@ -107,7 +107,7 @@ impl Stl {
     /// Errors of [`Self::voxels`].
     pub fn cells(&self, size: [f64; 3]) -> Result<[f64; 3], Error> {
         let [low, high] = self.bounds();
-        Ok(Frame::around(low, high, size)?.counts().map(|count| count as f64))
+        Ok(VoxelGrid::around(low, high, size)?.counts().map(|count| count as f64))
     }
 
     /// Builds the cells inside, at multiples of `size`. 8 × 8 rays in z through each column of cells are
@@ -119,18 +119,18 @@ impl Stl {
     /// reaches.
     pub fn voxels(&self, size: [f64; 3], least: f64) -> Result<(Voxels, Vec<String>), Error> {
         let [low, high] = self.bounds();
-        let frame = Frame::around(low, high, size)?;
+        let frame = VoxelGrid::around(low, high, size)?;
         let [nx, ny, nz] = frame.counts();
         let rays = [nx * RAYS, ny * RAYS];
         // crossings of each ray, in units of cells, and their directions
         let mut crossings: Vec<Vec<(f32, i8)>> = vec![Vec::new(); rays[0] * rays[1]];
         let points: Vec<[f64; 3]> =
             self.points.iter().map(|point| [0, 1, 2].map(|d| frame.units(point[d], d))).collect();
-        let place = |k: usize, d: usize| (k as f64 + 0.5 + ASIDE[d]) / RAYS as f64;
+        let place = |k: usize, d: usize| (k as f64 + 0.5 + RAY_OFFSET[d]) / RAYS as f64;
         for triangle in &self.triangles {
             let corners = triangle.map(|n| points[n as usize]);
             let range = |d: usize| {
-                let ends = corners.map(|corner| corner[d] * RAYS as f64 - 0.5 - ASIDE[d]);
+                let ends = corners.map(|corner| corner[d] * RAYS as f64 - 0.5 - RAY_OFFSET[d]);
                 let low = ends.into_iter().fold(f64::INFINITY, f64::min).ceil().max(0.0) as usize;
                 let high = ends.into_iter().fold(f64::NEG_INFINITY, f64::max).floor();
                 low..((high + 1.0).max(0.0) as usize).min(rays[d])
@@ -166,11 +166,11 @@ impl Stl {
             }
         }
         let mut notes = Vec::new();
-        let told = |volume: f64| volume > TOLD * self.volume;
-        if told(twice) {
+        let is_reported = |volume: f64| volume > MIN_REPORTED * self.volume;
+        if is_reported(twice) {
             notes.push(format!("shells overlap: {:.4} mm³ that lie in several count once", 1e9 * twice));
         }
-        if told(negative) {
+        if is_reported(negative) {
             let mm3 = 1e9 * negative;
             notes.push(format!(
                 "{mm3:.4} mm³ inside shells that face inwards, and in no other, are left empty"

@@ -1,11 +1,11 @@
 //! Structured meshes: grid lines along the axes, and filled boxes.
 
 use crate::error::Error;
-use crate::mesh::split::{Split, split};
+use crate::mesh::split::{CellSplit, split};
 use crate::mesh::{BOX_SIDES, Face, Mesh};
 
 /// Coordinates within this fraction of the extent are equal.
-const SAME: f64 = 1e-9;
+const COORDINATE_TOLERANCE: f64 = 1e-9;
 
 /// Largest number of nodes of a mesh: 2²⁸, or 15 GB of mesh alone, so that a typing error in a size gives a
 /// message instead of exhausting memory.
@@ -36,7 +36,7 @@ impl Grid {
     /// [`Error::Mesh`] or [`Error::Parameter`] for a box without volume, no elements, and more than 2²⁸
     /// nodes.
     pub fn uniform(lower: [f64; 3], upper: [f64; 3], elements: [usize; 3]) -> Result<Self, Error> {
-        few_enough(elements.map(|count| count as f64))?;
+        check_node_count(elements.map(|count| count as f64))?;
         let mut lines = [const { Vec::new() }; 3];
         for d in 0..3 {
             let [low, high, count] = [lower[d], upper[d], elements[d] as f64];
@@ -94,7 +94,7 @@ impl Grid {
         self.check()?;
         let end = |line: &Vec<f64>, first: bool| if first { line[0] } else { line[line.len() - 1] };
         let [lower, upper] = [true, false].map(|first| self.lines.each_ref().map(|line| end(line, first)));
-        self.blocks(&[Block { name: name.to_owned(), lower, upper }], Split::Hexahedra)
+        self.blocks(&[Block { name: name.to_owned(), lower, upper }], CellSplit::Hexahedra)
     }
 
     /// Meshes the cells inside any block, with element sets of the blocks (which may overlap: an element is
@@ -103,7 +103,7 @@ impl Grid {
     /// # Errors
     /// [`Error::Mesh`] or [`Error::Parameter`] for lines that do not ascend, a block without volume or
     /// elements, and more than 2²⁸ nodes.
-    pub fn blocks(&self, blocks: &[Block], cells: Split) -> Result<Mesh, Error> {
+    pub fn blocks(&self, blocks: &[Block], cells: CellSplit) -> Result<Mesh, Error> {
         self.check()?;
         let [nx, ny, nz] = self.lines.each_ref().map(|line| line.len() - 1);
         let mut ranges = Vec::with_capacity(blocks.len());
@@ -271,12 +271,12 @@ impl Grid {
                 return Err(Error::Mesh(format!("grid lines along {axis} do not ascend: {a} m, then {b} m")));
             }
         }
-        few_enough(self.lines.each_ref().map(|line| line.len() as f64 - 1.0))
+        check_node_count(self.lines.each_ref().map(|line| line.len() as f64 - 1.0))
     }
 }
 
 /// Refuses numbers of elements along each axis whose nodes cannot be numbered.
-pub(crate) fn few_enough(elements: [f64; 3]) -> Result<(), Error> {
+pub(crate) fn check_node_count(elements: [f64; 3]) -> Result<(), Error> {
     let nodes: f64 = elements.iter().map(|count| count + 1.0).product();
     if nodes <= MAX_NODES as f64 {
         return Ok(());
@@ -328,7 +328,7 @@ pub(crate) fn count(length: f64, first: f64, growth: f64) -> Result<f64, Error> 
         });
     }
     // a last element of less than a billionth is rounding
-    let ratio = length / first * (1.0 - SAME);
+    let ratio = length / first * (1.0 - COORDINATE_TOLERANCE);
     let count = if growth == 1.0 { ratio } else { (1.0 + ratio * (growth - 1.0)).ln() / growth.ln() };
     if count.is_nan() || count.ceil() >= MAX_NODES as f64 {
         let allowed = format!("at most {}", MAX_NODES - 1);
@@ -337,11 +337,11 @@ pub(crate) fn count(length: f64, first: f64, growth: f64) -> Result<f64, Error> 
     Ok(count.ceil().max(1.0))
 }
 
-/// Sorts coordinates; those closer than [`SAME`] of the extent become one.
+/// Sorts coordinates; those closer than [`COORDINATE_TOLERANCE`] of the extent become one.
 fn unique(mut values: Vec<f64>) -> Vec<f64> {
     values.sort_unstable_by(f64::total_cmp);
     let extent = values.last().zip(values.first()).map_or(0.0, |(last, first)| last - first);
-    values.dedup_by(|next, kept| *next - *kept <= SAME * extent);
+    values.dedup_by(|next, kept| *next - *kept <= COORDINATE_TOLERANCE * extent);
     values
 }
 
@@ -377,7 +377,7 @@ mod tests {
         ];
         let grid = Grid::through(&blocks, [0.5, 1.0, 0.5]).unwrap();
         assert_eq!(grid.lines[0].len(), 7);
-        let mesh = grid.blocks(&blocks, Split::Hexahedra).unwrap();
+        let mesh = grid.blocks(&blocks, CellSplit::Hexahedra).unwrap();
         assert_eq!(mesh.hexahedra.len(), 12 + 8);
         assert_eq!(mesh.element_sets["leg"].len(), 12);
         assert!(mesh.element_sets["head"].iter().all(|e| mesh.element_sets["leg"].contains(e)));
@@ -389,7 +389,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_a_grid_is_named() {
+    fn invalid_grids_are_refused() {
         let text = |result: Result<Grid, Error>| result.unwrap_err().to_string();
         assert!(text(Grid::uniform([0.0; 3], [1.0, 0.0, 1.0], [1; 3])).contains("along y has no extent"));
         assert!(text(Grid::uniform([0.0; 3], [1.0; 3], [0, 1, 1])).contains("found 0; allowed: 1 …"));
@@ -399,7 +399,7 @@ mod tests {
         assert!(text(Grid::through(&[], [1.0; 3])).contains("grid lines"));
         let mut grid = Grid::uniform([0.0; 3], [1.0; 3], [2; 3]).unwrap();
         let far = Block { name: "far".into(), lower: [2.0; 3], upper: [3.0; 3] };
-        let error = grid.blocks(&[far], Split::Hexahedra).unwrap_err().to_string();
+        let error = grid.blocks(&[far], CellSplit::Hexahedra).unwrap_err().to_string();
         assert!(error.contains("`far` contains no element"));
         grid.lines[1].swap(0, 1);
         assert!(

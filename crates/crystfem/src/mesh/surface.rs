@@ -10,7 +10,7 @@ const NONE: u32 = u32::MAX;
 /// Outer surface of the active elements: faces with exactly one active element. Neighbours are found once;
 /// each activation updates only the faces of the new elements.
 #[derive(Clone, Debug)]
-pub struct Surface {
+pub struct OuterSurface {
     /// Number of hexahedra.
     hexahedra: usize,
     /// Number of elements.
@@ -26,21 +26,21 @@ pub struct Surface {
 
 /// Change of the outer surface by an activation; faces sorted.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Change {
+pub struct SurfaceChange {
     /// Faces that became outer faces.
     pub appeared: Vec<Face>,
     /// Faces that are no longer outer faces.
     pub vanished: Vec<Face>,
 }
 
-/// A set of faces that may become outer faces; see [`Surface::region`].
+/// A set of faces that may become outer faces; see [`OuterSurface::region`].
 #[derive(Clone, Debug, PartialEq)]
-pub struct Region {
+pub struct FaceRegion {
     /// Face numbers, sorted.
     faces: Vec<u32>,
 }
 
-impl Surface {
+impl OuterSurface {
     /// Finds the neighbours in a mesh; no element is active.
     ///
     /// # Errors
@@ -87,7 +87,7 @@ impl Surface {
     ///
     /// # Errors
     /// [`Error::Parameter`] for an element out of range, without any change.
-    pub fn activate(&mut self, elements: &[u32]) -> Result<Change, Error> {
+    pub fn activate(&mut self, elements: &[u32]) -> Result<SurfaceChange, Error> {
         if let Some(element) = elements.iter().find(|element| **element as usize >= self.elements) {
             let allowed = format!("below {}", self.elements);
             return Err(Error::Parameter { name: "element", found: f64::from(*element), allowed });
@@ -99,7 +99,7 @@ impl Surface {
         for element in &fresh {
             self.active[*element as usize] = true;
         }
-        let mut change = Change::default();
+        let mut change = SurfaceChange::default();
         for element in fresh {
             for number in self.faces_of(element) {
                 let opposite = self.opposite[number];
@@ -146,7 +146,7 @@ impl Surface {
     /// # Errors
     /// [`Error::Unknown`] for another name, and [`Error::Mesh`] for a named surface with a face that does not
     /// exist.
-    pub fn region(&self, mesh: &Mesh, name: &str) -> Result<Region, Error> {
+    pub fn region(&self, mesh: &Mesh, name: &str) -> Result<FaceRegion, Error> {
         let mut faces = Vec::new();
         if let Some(named) = mesh.surfaces.get(name) {
             for face in named {
@@ -199,17 +199,17 @@ impl Surface {
         }
         faces.sort_unstable();
         faces.dedup();
-        Ok(Region { faces })
+        Ok(FaceRegion { faces })
     }
 
     /// Outer faces in a region, ascending.
-    pub fn faces_in(&self, region: &Region) -> Vec<Face> {
+    pub fn faces_in(&self, region: &FaceRegion) -> Vec<Face> {
         let outer = |number: &&u32| self.outer.get(**number as usize) == Some(&true);
         region.faces.iter().filter(outer).map(|number| self.face(*number)).collect()
     }
 
     /// All faces of a region, outer or not, ascending.
-    pub fn all_in(&self, region: &Region) -> Vec<Face> {
+    pub fn all_in(&self, region: &FaceRegion) -> Vec<Face> {
         region.faces.iter().map(|number| self.face(*number)).collect()
     }
 
@@ -346,7 +346,7 @@ pub fn area(mesh: &Mesh, face: Face) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::{Bar, Block, Grid, Split, Substrate};
+    use crate::mesh::{Bar, Block, CellSplit, Grid, Substrate};
 
     fn total(mesh: &Mesh, faces: impl IntoIterator<Item = Face>) -> f64 {
         faces.into_iter().map(|face| area(mesh, face)).sum()
@@ -362,11 +362,11 @@ mod tests {
             elements_per_layer: 2,
             element_size: 1e-3,
             substrate: Some(substrate),
-            cells: Split::Hexahedra,
+            cells: CellSplit::Hexahedra,
         }
         .mesh()
         .unwrap();
-        let mut surface = Surface::new(&mesh).unwrap();
+        let mut surface = OuterSurface::new(&mesh).unwrap();
         assert_eq!(surface.faces().count(), 0);
         surface.activate(&mesh.element_sets["substrate"]).unwrap();
         let glass = 2.0 * (0.03 * 0.01 + 0.04 * 2e-3);
@@ -381,28 +381,28 @@ mod tests {
             assert!(change.vanished.iter().all(|face| !surface.is_outer(*face)));
         }
         // one by one or at once: the same surface
-        let whole: Vec<Face> = Surface::of_all(&mesh).unwrap().faces().collect();
+        let whole: Vec<Face> = OuterSurface::of_all(&mesh).unwrap().faces().collect();
         assert_eq!(surface.faces().collect::<Vec<_>>(), whole);
-        let mut backwards = Surface::new(&mesh).unwrap();
+        let mut backwards = OuterSurface::new(&mesh).unwrap();
         for element in (0..mesh.element_count() as u32).rev() {
             backwards.activate(&[element, element]).unwrap();
         }
         assert_eq!(backwards.faces().collect::<Vec<_>>(), whole);
-        assert_eq!(backwards.activate(&[0]).unwrap(), Change::default());
+        assert_eq!(backwards.activate(&[0]).unwrap(), SurfaceChange::default());
         assert!(backwards.activate(&[u32::MAX]).is_err());
     }
 
     #[test]
-    fn regions_are_asked_by_name() {
+    fn regions_are_found_by_name() {
         let grid = Grid::uniform([0.0; 3], [1.0, 1.0, 2.0], [2, 2, 4]).unwrap();
         let block =
             |name: &str, z0, z1| Block { name: name.into(), lower: [0.0, 0.0, z0], upper: [1.0, 1.0, z1] };
         let mut mesh =
-            grid.blocks(&[block("lower", 0.0, 1.0), block("upper", 1.0, 2.0)], Split::Hexahedra).unwrap();
+            grid.blocks(&[block("lower", 0.0, 1.0), block("upper", 1.0, 2.0)], CellSplit::Hexahedra).unwrap();
         // the interface, given from above
         let above = mesh.element_sets["upper"][..4].iter().map(|element| Face { element: *element, side: 0 });
         mesh.surfaces.insert("interface".into(), above.collect());
-        let mut surface = Surface::new(&mesh).unwrap();
+        let mut surface = OuterSurface::new(&mesh).unwrap();
         surface.activate(&mesh.element_sets["lower"]).unwrap();
         let interface = surface.region(&mesh, "interface").unwrap();
         let faces = surface.faces_in(&interface);
@@ -435,11 +435,11 @@ mod tests {
     fn three_elements_a_face_and_missing_nodes_are_refused() {
         let mut mesh = Mesh { points: vec![[0.0; 3]; 6], ..Mesh::default() };
         mesh.tetrahedra = vec![[0, 1, 2, 3], [0, 2, 1, 4], [0, 1, 2, 5]];
-        let error = Surface::new(&mesh).unwrap_err().to_string();
+        let error = OuterSurface::new(&mesh).unwrap_err().to_string();
         assert!(error.contains("elements 0, 1, 2 share one face"), "{error}");
         mesh.tetrahedra = vec![[6, 7, 8, 9]];
-        assert!(Surface::new(&mesh).unwrap_err().to_string().contains("node 6; allowed: below 6"));
-        assert_eq!(Surface::of_all(&Mesh::default()).unwrap().faces().count(), 0);
+        assert!(OuterSurface::new(&mesh).unwrap_err().to_string().contains("node 6; allowed: below 6"));
+        assert_eq!(OuterSurface::of_all(&Mesh::default()).unwrap().faces().count(), 0);
     }
 
     #[test]

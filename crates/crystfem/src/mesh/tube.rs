@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_tube_is_named() {
+    fn invalid_tubes_are_refused() {
         let tube = Tube { radii: [0.02, 0.1], angle: 1.0, length: 0.14, elements: [2, 1, 2] };
         let refused = |tube: Tube, words: &str| {
             let text = tube.mesh().unwrap_err().to_string();

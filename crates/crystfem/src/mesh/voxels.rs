@@ -1,7 +1,7 @@
 //! Bodies as cells of a grid, each with its fill fraction.
 
 use crate::error::Error;
-use crate::mesh::structured::few_enough;
+use crate::mesh::structured::check_node_count;
 use crate::mesh::{Grid, Mesh};
 
 /// Accepted range of cell volume over body volume.
@@ -27,13 +27,13 @@ pub struct Voxels {
 }
 
 /// Grid of cells around a box, at multiples of their size.
-pub(super) struct Frame {
+pub(super) struct VoxelGrid {
     first: [f64; 3],
     count: [usize; 3],
     size: [f64; 3],
 }
 
-impl Frame {
+impl VoxelGrid {
     /// Encloses a box; faces within a millionth of a cell of a line count as on it.
     pub fn around(low: [f64; 3], high: [f64; 3], size: [f64; 3]) -> Result<Self, Error> {
         if let Some(found) = size.into_iter().find(|size| !(*size > 0.0 && size.is_finite())) {
@@ -41,7 +41,7 @@ impl Frame {
             return Err(Error::Parameter { name, found, allowed });
         }
         let ends = [0, 1, 2].map(|d| [(low[d] / size[d] + 1e-6).floor(), (high[d] / size[d] - 1e-6).ceil()]);
-        few_enough(ends.map(|[first, last]| last - first))?;
+        check_node_count(ends.map(|[first, last]| last - first))?;
         let count = ends.map(|[first, last]| ((last - first) as usize).max(1));
         Ok(Self { first: [0, 1, 2].map(|d| ends[d][0] * size[d]), count, size })
     }
@@ -110,7 +110,7 @@ impl Voxels {
     }
 
     /// Returns true if full cells may represent the body.
-    pub fn may_be_full(&self) -> bool {
+    pub fn can_be_full(&self) -> bool {
         (RATIOS[0]..=RATIOS[1]).contains(&self.ratio)
     }
 }

@@ -1,13 +1,13 @@
 //! A material along a piecewise linear temperature history.
 
 use crate::error::Error;
-use crate::material::{Point, ThermalMaterial};
+use crate::material::{PointInput, ThermalMaterial};
 use nalgebra::Vector3;
 
 /// Largest change of temperature in a step, K.
 const STEP: f64 = 0.25;
 /// Limit on steps between two times.
-const MOST: f64 = 10_000.0;
+const MAX_STEPS: f64 = 10_000.0;
 
 /// A material point, and the temperatures at which its first field, α, reached `N` values.
 #[derive(Clone, Debug)]
@@ -39,10 +39,10 @@ impl<const N: usize> MaterialPoint<N> {
     /// Errors of the material.
     pub fn advance(&mut self, material: &dyn ThermalMaterial, to: f64, duration: f64) -> Result<(), Error> {
         let change = to - self.temperature;
-        let steps = (change.abs() / STEP).ceil().clamp(1.0, MOST);
+        let steps = (change.abs() / STEP).ceil().clamp(1.0, MAX_STEPS);
         for _ in 0..steps as usize {
             let (increment, dt) = (change / steps, duration / steps);
-            let at = Point { temperature: self.temperature, increment, gradient: Vector3::zeros(), dt };
+            let at = PointInput { temperature: self.temperature, increment, gradient: Vector3::zeros(), dt };
             let (old, before) = (self.state.clone(), self.fields[0]);
             material.respond(&at, &old, &mut self.state)?;
             material.fields(&self.state, &mut self.fields);

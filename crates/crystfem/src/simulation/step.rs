@@ -1,8 +1,8 @@
 //! An accepted step: its length, attempts and result.
 
-use super::{LinearSolver, Method, Points, Simulation, State};
+use super::{LinearMethod, LinearSolver, PointStates, Simulation, State};
 use crate::error::Error;
-use crate::ledger::Record;
+use crate::ledger::StepBalance;
 use crate::solver::LEVELS;
 use crate::system::StepInput;
 use crate::system::vector::{set, sum};
@@ -11,15 +11,19 @@ use crate::time::{Attempt, Scheme, Stepper, Steps, Work};
 /// Safety factor on the step length of error control.
 const SAFETY: f64 = 0.9;
 /// Largest growth of the step length.
-const MOST_GROWTH: f64 = 4.0;
+const MAX_GROWTH: f64 = 4.0;
 /// Iterations of a solve below which no other method is cheaper.
-const FEWEST: f64 = 16.0;
+const MIN_COSTLY_ITERATIONS: f64 = 16.0;
 /// Expected number of solves with the matrix of equal steps.
-const MANY: f64 = 20.0;
+const EQUAL_STEP_SOLVES: f64 = 20.0;
 
 impl Simulation {
     /// Makes one accepted step.
-    pub(super) fn step(&mut self, until: f64, stop: &(dyn Fn() -> bool + Sync)) -> Result<Record, Error> {
+    pub(super) fn step(
+        &mut self,
+        until: f64,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Result<StepBalance, Error> {
         let time = self.state.time;
         let next = self.breaks[self.breaks.partition_point(|&t| t <= time)..].first().copied();
         let target = next.map_or(until, |next| next.min(until));
@@ -42,7 +46,7 @@ impl Simulation {
         };
         let before = self.state.work;
         // step lengths from a ladder, so that factors serve many steps
-        if let (Method::Factors, Steps::Adaptive { first, .. }, true) =
+        if let (LinearMethod::Factors, Steps::Adaptive { first, .. }, true) =
             (self.state.method, self.settings.steps, self.system.is_linear())
         {
             wanted = first * (wanted / first * (1.0 + 1e-9)).log2().floor().exp2();
@@ -68,7 +72,7 @@ impl Simulation {
             let single = adaptive.is_none() && (!equal || scheme != self.settings.scheme);
             let single = single && self.settings.solver != LinearSolver::Direct;
             self.stepper.stages.method = match self.state.method {
-                Method::Factors if single => Method::Diagonal,
+                LinearMethod::Factors if single => LinearMethod::Diagonal,
                 method => method,
             };
             let accuracy = adaptive.map(|(tolerance, ..)| 0.05 * tolerance);
@@ -101,13 +105,13 @@ impl Simulation {
             // the length as requested: rounding at large times may lengthen the actual one
             let shortest = wanted.min(dt) <= smallest * (1.0 + 1e-9);
             // a ratio below this repeats the step instead of shortening the next one
-            const REFUSED: f64 = 0.5;
+            const MIN_ACCEPTED_RATIO: f64 = 0.5;
             let factor = match &attempt {
                 Ok(attempt) => {
                     let ratio = attempt.step_ratio.unwrap_or(f64::INFINITY);
                     let error = attempt.error.unwrap_or(0.0) / tolerance;
-                    let grow = (SAFETY * error.powf(-1.0 / f64::from(attempt.order))).clamp(0.1, MOST_GROWTH);
-                    if (error <= 1.0 && ratio >= REFUSED) || shortest {
+                    let grow = (SAFETY * error.powf(-1.0 / f64::from(attempt.order))).clamp(0.1, MAX_GROWTH);
+                    if (error <= 1.0 && ratio >= MIN_ACCEPTED_RATIO) || shortest {
                         // a step shortened to end at a given time says little about the next one
                         let grown = (dt * grow).max(if lands { wanted } else { 0.0 });
                         self.state.next_dt = grown.min(dt * ratio).clamp(smallest, largest);
@@ -127,15 +131,18 @@ impl Simulation {
         }
     }
 
-    /// Chooses the method again once steps with more than [`FEWEST`] iterations a solve have taken [`LEVELS`]
-    /// in total, the cost of preparing another method. Work is counted, not timed, so that a resumed run
-    /// decides alike.
+    /// Chooses the method again once steps with more than [`MIN_COSTLY_ITERATIONS`] iterations a solve have
+    /// taken [`LEVELS`] in total, the cost of preparing another method. Work is counted, not timed, so that a
+    /// resumed run decides alike.
     fn reconsider(&mut self, before: &Work, until: f64) {
         let work = &self.state.work;
         let solves = (work.cg_solves - before.cg_solves) as f64;
         let iterations = (work.cg_iterations - before.cg_iterations) as f64;
-        let candidate = self.state.method == Method::Diagonal && self.system.is_symmetric();
-        if self.settings.solver != LinearSolver::Auto || !candidate || iterations <= FEWEST * solves {
+        let candidate = self.state.method == LinearMethod::Diagonal && self.system.is_symmetric();
+        if self.settings.solver != LinearSolver::Auto
+            || !candidate
+            || iterations <= MIN_COSTLY_ITERATIONS * solves
+        {
             return;
         }
         self.state.excess += iterations;
@@ -145,11 +152,11 @@ impl Simulation {
         // both stages of a step, and the filter of its error
         let one = match (self.system.is_linear(), self.settings.scheme, self.settings.steps) {
             (false, ..) => 1.0,
-            (_, _, Steps::Fixed { .. }) => MANY,
+            (_, _, Steps::Fixed { .. }) => EQUAL_STEP_SOLVES,
             (_, Scheme::BackwardEuler, _) => 2.0,
             (_, Scheme::TrBdf2, _) => 3.0,
         };
-        self.state.method = self.task(until).instead(iterations / solves, one);
+        self.state.method = self.task(until).method_after(iterations / solves, one);
         self.state.excess = 0.0;
     }
 
@@ -162,7 +169,7 @@ impl Simulation {
         let nodal = &self.system.nodal;
         let new = &mut stages.evaluation.memory.nodal;
         let points = if in_place {
-            *new = Points::default();
+            *new = PointStates::default();
             &mut memory.nodal
         } else {
             nodal.keep_followers(&memory.nodal, new);
@@ -180,7 +187,7 @@ impl Simulation {
     }
 
     /// Makes the end of the attempt the new state.
-    fn accept(&mut self, [dt, end]: [f64; 2], attempt: &Attempt) -> Record {
+    fn accept(&mut self, [dt, end]: [f64; 2], attempt: &Attempt) -> StepBalance {
         let in_place = self.in_place();
         // fixed steps of backward Euler never use the previous rate
         let rated = self.settings.scheme != Scheme::BackwardEuler
@@ -190,7 +197,7 @@ impl Simulation {
         let Stepper { temperature, stages, .. } = stepper;
         let residual = &stages.residual;
         let change = &stages.evaluation.change;
-        let record = Record {
+        let record = StepBalance {
             time: end,
             dt,
             stored: sum(size, |k| change[k]),

@@ -7,15 +7,15 @@
 use rayon::prelude::*;
 
 /// Largest squared distance of near neighbours over the smallest one.
-const NEAR: f64 = 4.0;
+const NEAR_RATIO: f64 = 4.0;
 /// Number of unknowns that are not aggregated further.
-const FEW: usize = 60;
+const MAX_UNAGGREGATED: usize = 60;
 /// Smallest coarsening ratio that is worth a level.
-const LEAST: f64 = 1.5;
+const MIN_COARSENING: f64 = 1.5;
 /// Smoothing factor 1/λ of the prolongation: λ of D⁻¹K is below 2 in most meshes.
 const SMOOTHING: f64 = 2.0 / 3.0;
 /// Smallest fraction of the diagonal that remains without far neighbours.
-const PIVOT: f64 = 0.1;
+const MIN_DIAGONAL: f64 = 0.1;
 /// No unknown.
 const NONE: u32 = u32::MAX;
 
@@ -145,7 +145,7 @@ pub fn levels(
     let mut levels = Vec::new();
     loop {
         let exists = (0..conduction.rows()).filter(|&row| conduction.row(row).next().is_some()).count();
-        if exists <= FEW {
+        if exists <= MAX_UNAGGREGATED {
             return levels;
         }
         let near = |row: usize| {
@@ -161,11 +161,11 @@ pub fn levels(
                     .filter(move |&column| column as usize != row)
             };
             let least = others().map(square).fold(f64::INFINITY, f64::min);
-            others().filter(move |&column| square(column) <= NEAR * (1.0 + 1e-9) * least)
+            others().filter(move |&column| square(column) <= NEAR_RATIO * (1.0 + 1e-9) * least)
         };
         let (group, count) =
             aggregate(conduction.rows(), |row| near(row), |row| conduction.row(row).next().is_some());
-        if (exists as f64) < LEAST * f64::from(count) {
+        if (exists as f64) < MIN_COARSENING * f64::from(count) {
             return levels;
         }
         let prolongation = Sparse::build(conduction.rows(), count as usize, |row, add| {
@@ -184,7 +184,7 @@ pub fn levels(
                     diagonal += value;
                 }
             }
-            let factor = SMOOTHING / if diagonal > PIVOT * whole { diagonal } else { whole };
+            let factor = SMOOTHING / if diagonal > MIN_DIAGONAL * whole { diagonal } else { whole };
             add(group[row], 1.0 - factor * diagonal);
             for (column, value) in
                 conduction.row(row).filter(|(column, _)| list.binary_search(column).is_ok())

@@ -10,18 +10,18 @@ pub struct Cached<T> {
 
 impl<T> Cached<T> {
     /// Returns true if the value was made for this key.
-    pub fn is_for(&self, key: (u64, u64)) -> bool {
+    pub fn matches(&self, key: (u64, u64)) -> bool {
         self.key == Some(key)
     }
 
     /// Returns true if the value was made for this build of the equations, whose number is the upper half of
     /// the generation.
-    pub fn is_for_build(&self, build: u64) -> bool {
+    pub fn matches_build(&self, build: u64) -> bool {
         self.key.is_some_and(|(generation, _)| generation >> 32 == build)
     }
 
     /// Sets the key.
-    pub fn made_for(&mut self, key: (u64, u64)) {
+    pub fn set_key(&mut self, key: (u64, u64)) {
         self.key = Some(key);
     }
 

@@ -12,7 +12,7 @@ use crate::system::vector::{advance, blend, dot, turn};
 
 /// Outcome of an iteration.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ended {
+pub struct SolveOutcome {
     /// Number of iterations.
     pub iterations: usize,
     /// Estimated rms error, K.
@@ -23,7 +23,7 @@ pub struct Ended {
 
 /// Stopping criterion of an iteration.
 #[derive(Clone, Copy)]
-pub struct Goal<'a> {
+pub struct StoppingCriterion<'a> {
     /// ΣC, J/K.
     pub capacity: f64,
     /// Tolerance of the error, K.
@@ -38,58 +38,59 @@ pub struct Goal<'a> {
 
 /// Relative change of a solution by packed rows, in the norm of A: 2⁻²⁴ of the terms |a_ij| (x_i − x_j)²/2,
 /// whose sum is at most about four times xᵀAx, since entries have both signs.
-const PACKED: f64 = 4.0 / 16_777_216.0;
+const PACKED_CHANGE: f64 = 4.0 / 16_777_216.0;
 /// Fraction of the remaining error that packed rows may cause.
-const UNSEEN: f64 = 0.03;
+const PACKED_ERROR: f64 = 0.03;
 /// Fraction of the tolerance that packed rows may cause.
-const UNSEEN_AT_END: f64 = 0.3;
+const PACKED_ERROR_AT_END: f64 = 0.3;
 
 /// Error estimate: the last four terms of eᵀAe, from which the remaining sum is extrapolated.
-struct Estimate {
+struct ErrorEstimate {
     terms: [f64; 4],
     /// xᵀAx of the changes of the solution since its residual was computed with A itself.
     since: f64,
 }
 
 /// Action after an iteration.
-enum Next {
+enum NextAction {
     Iterate,
     /// Recompute the residual with A itself first.
     Renew,
-    End(Ended),
+    End(SolveOutcome),
 }
 
-impl Estimate {
+impl ErrorEstimate {
     fn new() -> Self {
         Self { terms: [f64::INFINITY; 4], since: 0.0 }
     }
 
     /// Adds a term, and returns the next action.
-    fn next(&mut self, term: f64, iterations: usize, goal: &Goal, packed: bool) -> Next {
+    fn next(&mut self, term: f64, iterations: usize, goal: &StoppingCriterion, packed: bool) -> NextAction {
         self.since += term;
-        let Some(left) = self.left(term) else { return Next::Iterate };
+        let Some(left) = self.remaining(term) else { return NextAction::Iterate };
         let wanted = goal.tolerance * goal.tolerance * goal.capacity;
-        let rounded = if packed { PACKED * PACKED * self.since } else { 0.0 };
-        let most = (UNSEEN * UNSEEN * left).max(UNSEEN_AT_END * UNSEEN_AT_END * wanted);
+        let rounded = if packed { PACKED_CHANGE * PACKED_CHANGE * self.since } else { 0.0 };
+        let most =
+            (PACKED_ERROR * PACKED_ERROR * left).max(PACKED_ERROR_AT_END * PACKED_ERROR_AT_END * wanted);
         if rounded > most {
             self.since = left;
-            return Next::Renew;
+            return NextAction::Renew;
         }
         if left > wanted {
-            return Next::Iterate;
+            return NextAction::Iterate;
         }
         let error = (left / goal.capacity).sqrt();
-        Next::End(Ended { iterations, error, converged: true })
+        NextAction::End(SolveOutcome { iterations, error, converged: true })
     }
 
     /// Returns the outcome at the iteration limit.
-    fn given_up(&self, goal: &Goal) -> Ended {
+    fn at_limit(&self, goal: &StoppingCriterion) -> SolveOutcome {
         let error = (self.terms[3] / goal.capacity).sqrt();
-        Ended { iterations: goal.limit, error, converged: false }
+        SolveOutcome { iterations: goal.limit, error, converged: false }
     }
 
     /// Estimates the sum of later terms, K²·J/K; `None` if unknown yet.
-    fn left(&mut self, term: f64) -> Option<f64> {
+    fn remaining(&mut self, term: f64) -> Option<f64> {
         let terms = &mut self.terms;
         let first = terms[3] == f64::INFINITY;
         terms.rotate_left(1);
@@ -127,22 +128,22 @@ impl ConjugateGradients {
         inverse: &[f64],
         residual: &mut [f64],
         solution: &mut [f64],
-        goal: &Goal,
-    ) -> Ended {
+        goal: &StoppingCriterion,
+    ) -> SolveOutcome {
         let size = residual.len();
         self.direction.resize(size, 0.0);
         self.image.resize(size, 0.0);
         self.conditioned.resize(if multigrid.is_some() { size } else { 0 }, 0.0);
         self.direction.fill(0.0);
         solution.fill(0.0);
-        self.keep(operator, residual);
+        self.save_residual(operator, residual);
         let Self { direction, image, conditioned, right } = self;
-        let mut estimate = Estimate::new();
+        let mut estimate = ErrorEstimate::new();
         let mut last = f64::INFINITY;
         let mut norm = norm_squared(residual, inverse);
         for iteration in 0..goal.limit {
             if norm <= goal.floor || norm == 0.0 {
-                return Ended { iterations: iteration, error: 0.0, converged: true };
+                return SolveOutcome { iterations: iteration, error: 0.0, converged: true };
             }
             let square = match &mut multigrid {
                 Some(multigrid) => {
@@ -160,23 +161,23 @@ impl ConjugateGradients {
             last = square;
             let curvature = operator.product(direction, image);
             if (goal.stop)() || !(curvature > 0.0 && curvature.is_finite() && square > 0.0) {
-                return Ended { iterations: iteration, error: f64::NAN, converged: false };
+                return SolveOutcome { iterations: iteration, error: f64::NAN, converged: false };
             }
             let length = square / curvature;
             norm = advance(length, solution, residual, direction, image, inverse);
             match estimate.next(length * square, iteration + 1, goal, operator.packed.is_some()) {
-                Next::End(ended) => return ended,
-                Next::Renew => {
+                NextAction::End(ended) => return ended,
+                NextAction::Renew => {
                     renew(operator, right, inverse, residual, solution);
                     norm = norm_squared(residual, inverse);
                 }
-                Next::Iterate => {}
+                NextAction::Iterate => {}
             }
         }
-        estimate.given_up(goal)
+        estimate.at_limit(goal)
     }
 
-    fn keep(&mut self, operator: &Operator, residual: &[f64]) {
+    fn save_residual(&mut self, operator: &Operator, residual: &[f64]) {
         self.right.clear();
         if operator.packed.is_some() {
             self.right.extend_from_slice(residual);
@@ -194,13 +195,13 @@ fn renew(operator: &Operator, right: &[f64], inverse: &[f64], residual: &mut [f6
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::system::{FaceMatrices, Rows};
+    use crate::system::{ConductionRows, FaceMatrices};
 
     /// Estimate bounds the true error for a known x on a line of 500 with diagonal 2 + 1e-3.
     #[test]
     fn the_error_is_below_the_tolerance() {
         let size = 500;
-        let rows = Rows::build(size, false, |row, out| {
+        let rows = ConductionRows::build(size, false, |row, out| {
             out.begin(std::iter::empty());
             out.add(0, 2.0, 0.0);
             if row > 0 {
@@ -231,7 +232,7 @@ mod tests {
                 &inverse,
                 &mut right,
                 &mut solution,
-                &Goal { capacity: 0.5, tolerance, floor: 0.0, limit: 1000, stop: &|| false },
+                &StoppingCriterion { capacity: 0.5, tolerance, floor: 0.0, limit: 1000, stop: &|| false },
             );
             let error = solution.iter().zip(&exact).map(|(s, e)| (s - e) * (s - e)).sum::<f64>();
             assert!(ended.converged, "{ended:?}");
@@ -240,8 +241,8 @@ mod tests {
     }
 
     #[test]
-    fn an_indefinite_matrix_and_a_short_limit_are_told() {
-        let rows = Rows::build(2, false, |_, out| {
+    fn an_indefinite_matrix_and_a_short_limit_are_reported() {
+        let rows = ConductionRows::build(2, false, |_, out| {
             out.begin(std::iter::empty());
             out.add(0, -1.0, 0.0);
         });
@@ -255,7 +256,8 @@ mod tests {
         let mut solution = [0.0; 2];
         let mut solve = |limit| {
             let (mut residual, mut cg) = ([1.0, 2.0], ConjugateGradients::default());
-            let goal = Goal { capacity: 1.0, tolerance: 1e-9, floor: 0.0, limit, stop: &|| false };
+            let goal =
+                StoppingCriterion { capacity: 1.0, tolerance: 1e-9, floor: 0.0, limit, stop: &|| false };
             cg.solve(None, &operator, &[1.0; 2], &mut residual, &mut solution, &goal)
         };
         assert!(!solve(10).converged);

@@ -5,7 +5,7 @@
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum LinearSolver {
-    /// Automatic, by an estimate of the work, see [`Choice`].
+    /// Automatic, by an estimate of the work, see [`SolverChoice`].
     #[default]
     Auto,
     /// Conjugate gradients with the diagonal as preconditioner.
@@ -18,7 +18,7 @@ pub enum LinearSolver {
 
 /// Method for linear systems.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub enum Method {
+pub enum LinearMethod {
     /// Conjugate or biconjugate gradients with the diagonal.
     #[default]
     Diagonal,
@@ -30,15 +30,15 @@ pub enum Method {
 
 /// A method with the reason for it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Choice {
+pub struct SolverChoice {
     /// Initial method.
-    pub method: Method,
+    pub method: LinearMethod,
     /// Reason for it.
     pub reason: String,
 }
 
 /// Largest number of equations for factors: about 1.5 GB.
-const MOST_EQUATIONS: usize = 250_000;
+const MAX_EQUATIONS: usize = 250_000;
 /// Cost of a multigrid solve in diagonal iterations: measured on blocks of 16³ to 48³ elements, a solve takes
 /// 10 to 21 cycles, and a cycle costs 3 to 5 iterations (up to 7 on bricks of equal elements).
 const CYCLES: f64 = 64.0;
@@ -48,7 +48,7 @@ pub const LEVELS: f64 = 300.0;
 
 /// Properties of a linear system known before it is solved.
 #[derive(Clone, Copy, Debug)]
-pub struct Task {
+pub struct LinearTask {
     /// Number of equations.
     pub size: usize,
     /// Number of equations along the longest side of the body.
@@ -71,7 +71,7 @@ pub struct Task {
     pub wanted: LinearSolver,
 }
 
-impl Task {
+impl LinearTask {
     /// Number of equations in a section across the longest side.
     fn across(&self) -> f64 {
         (self.size as f64 / self.length).max(1.0)
@@ -90,10 +90,10 @@ impl Task {
     /// entry. Factors have about 11 n √s entries with s equations across; the cost of a factorization and of
     /// a solve was measured relative to that (bricks of 20 000 and 97 000 equations: 100 and 180 iterations
     /// per solve, 800 and 3200 per factorization).
-    pub fn choose(&self) -> Choice {
+    pub fn choose(&self) -> SolverChoice {
         let by = |direct, reason: String| {
-            let method = if direct { Method::Factors } else { Method::Diagonal };
-            Choice { method, reason }
+            let method = if direct { LinearMethod::Factors } else { LinearMethod::Diagonal };
+            SolverChoice { method, reason }
         };
         if !self.symmetric {
             return by(
@@ -105,7 +105,10 @@ impl Task {
             LinearSolver::ConjugateGradients => return by(false, "conjugate gradients: requested".into()),
             LinearSolver::Direct => return by(true, "factors: requested".into()),
             LinearSolver::Multigrid if self.constant => {
-                return Choice { method: Method::Multigrid, reason: "multigrid: requested".into() };
+                return SolverChoice {
+                    method: LinearMethod::Multigrid,
+                    reason: "multigrid: requested".into(),
+                };
             }
             LinearSolver::Multigrid => {
                 return by(
@@ -115,7 +118,7 @@ impl Task {
             }
             LinearSolver::Auto => {}
         }
-        let until = "until others have become cheaper by their count";
+        let until = "until another method is cheaper by the iterations counted";
         if !self.linear {
             return by(false, format!("conjugate gradients: the matrix changes with temperature; {until}"));
         }
@@ -125,7 +128,7 @@ impl Task {
                 format!("conjugate gradients: the matrix changes with the adaptive step; {until}"),
             );
         }
-        if self.size > MOST_EQUATIONS {
+        if self.size > MAX_EQUATIONS {
             return by(
                 false,
                 format!("conjugate gradients: factors of {} equations are too large", self.size),
@@ -154,16 +157,16 @@ impl Task {
     }
 
     /// Picks the method to switch to from the diagonal, from iterations per solve and solves per matrix.
-    pub fn instead(&self, iterations: f64, solves: f64) -> Method {
+    pub fn method_after(&self, iterations: f64, solves: f64) -> LinearMethod {
         let [solve, factor] = self.direct(solves);
-        let factors = if self.size > MOST_EQUATIONS { f64::INFINITY } else { solve + factor };
+        let factors = if self.size > MAX_EQUATIONS { f64::INFINITY } else { solve + factor };
         let cycles = if self.constant { CYCLES } else { f64::INFINITY };
         if !self.symmetric || iterations <= factors.min(cycles) {
-            Method::Diagonal
+            LinearMethod::Diagonal
         } else if factors <= cycles {
-            Method::Factors
+            LinearMethod::Factors
         } else {
-            Method::Multigrid
+            LinearMethod::Multigrid
         }
     }
 }
@@ -173,8 +176,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_takes_over() {
-        let task = Task {
+    fn methods_after_slow_solves() {
+        let task = LinearTask {
             size: 100_000,
             length: 46.0,
             entries: 1000,
@@ -186,17 +189,17 @@ mod tests {
             equal_steps: false,
             wanted: LinearSolver::Auto,
         };
-        assert_eq!(task.instead(50.0, 1.0), Method::Diagonal);
-        assert_eq!(task.instead(200.0, 1.0), Method::Multigrid);
+        assert_eq!(task.method_after(50.0, 1.0), LinearMethod::Diagonal);
+        assert_eq!(task.method_after(200.0, 1.0), LinearMethod::Multigrid);
         // a rod of 3 × 3 nodes
-        assert_eq!(Task { length: 11_111.0, ..task }.instead(200.0, 1.0), Method::Factors);
-        assert_eq!(Task { constant: false, ..task }.instead(200.0, 1.0), Method::Diagonal);
-        assert_eq!(Task { symmetric: false, ..task }.instead(1e4, 1.0), Method::Diagonal);
+        assert_eq!(LinearTask { length: 11_111.0, ..task }.method_after(200.0, 1.0), LinearMethod::Factors);
+        assert_eq!(LinearTask { constant: false, ..task }.method_after(200.0, 1.0), LinearMethod::Diagonal);
+        assert_eq!(LinearTask { symmetric: false, ..task }.method_after(1e4, 1.0), LinearMethod::Diagonal);
     }
 
     #[test]
     fn long_steps_with_one_matrix_take_factors() {
-        let task = Task {
+        let task = LinearTask {
             size: 27_000,
             length: 30.0,
             entries: 1000,
@@ -208,20 +211,23 @@ mod tests {
             equal_steps: true,
             wanted: LinearSolver::Auto,
         };
-        assert!(task.choose().method == Method::Diagonal);
-        let long = Task { stiffness: 1e4, ..task };
-        assert!(long.choose().method == Method::Factors && long.choose().reason.contains("1000 solves"));
-        assert!(Task { solves: 1.0, ..long }.choose().method == Method::Diagonal);
-        assert!(Task { linear: false, ..long }.choose().method == Method::Diagonal);
-        assert!(Task { equal_steps: false, ..long }.choose().method == Method::Diagonal);
+        assert!(task.choose().method == LinearMethod::Diagonal);
+        let long = LinearTask { stiffness: 1e4, ..task };
         assert!(
-            Task { symmetric: false, wanted: LinearSolver::Direct, ..long }.choose().method
-                == Method::Diagonal
+            long.choose().method == LinearMethod::Factors && long.choose().reason.contains("1000 solves")
         );
-        assert!(Task { size: 1_000_000, ..long }.choose().method == Method::Diagonal);
-        assert!(Task { wanted: LinearSolver::Direct, ..task }.choose().method == Method::Factors);
+        assert!(LinearTask { solves: 1.0, ..long }.choose().method == LinearMethod::Diagonal);
+        assert!(LinearTask { linear: false, ..long }.choose().method == LinearMethod::Diagonal);
+        assert!(LinearTask { equal_steps: false, ..long }.choose().method == LinearMethod::Diagonal);
         assert!(
-            Task { wanted: LinearSolver::ConjugateGradients, ..long }.choose().method == Method::Diagonal
+            LinearTask { symmetric: false, wanted: LinearSolver::Direct, ..long }.choose().method
+                == LinearMethod::Diagonal
+        );
+        assert!(LinearTask { size: 1_000_000, ..long }.choose().method == LinearMethod::Diagonal);
+        assert!(LinearTask { wanted: LinearSolver::Direct, ..task }.choose().method == LinearMethod::Factors);
+        assert!(
+            LinearTask { wanted: LinearSolver::ConjugateGradients, ..long }.choose().method
+                == LinearMethod::Diagonal
         );
     }
 }

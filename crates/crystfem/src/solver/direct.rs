@@ -104,15 +104,15 @@ impl Direct {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::system::{FaceMatrices, Rows};
+    use crate::system::{ConductionRows, FaceMatrices};
 
     /// Solves reproduce a known x for the five-point Laplacian of a grid plus a shift, with one equation
     /// fixed.
     #[test]
-    fn it_solves_what_it_factors() {
+    fn solves_reproduce_a_known_vector() {
         let (width, height) = (23_usize, 17);
         let size = width * height;
-        let rows = Rows::build(size, false, |row, out| {
+        let rows = ConductionRows::build(size, false, |row, out| {
             out.begin(std::iter::empty());
             out.add(0, 4.0, 0.0);
             for (other, there) in [

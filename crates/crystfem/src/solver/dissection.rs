@@ -4,7 +4,7 @@
 use polycore::numerics::bounds;
 
 /// Largest number of equations of a part that is not cut further.
-const SMALLEST: usize = 64;
+const MAX_UNCUT: usize = 64;
 
 /// Returns equations in elimination order. A part is cut across its longest side; equations beyond the cut
 /// that are coupled to the other half come last. `neighbours` visits the equations coupled to one.
@@ -29,7 +29,7 @@ pub fn order(
         // planes of nodes may differ by rounding
         let cut = cut - 1e-9 * (high[longest] - low[longest]);
         let (near, far): (Vec<u32>, Vec<u32>) = part.iter().partition(|&&e| place(e)[longest] < cut);
-        if part.len() <= SMALLEST || near.is_empty() {
+        if part.len() <= MAX_UNCUT || near.is_empty() {
             part.reverse();
             reversed.append(&mut part);
             continue;

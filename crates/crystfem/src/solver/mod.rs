@@ -11,14 +11,14 @@ mod multigrid;
 mod packed;
 
 pub use cached::Cached;
-pub use cg::{Ended, Goal};
-pub use choice::{Choice, LEVELS, LinearSolver, Method, Task};
+pub use cg::{SolveOutcome, StoppingCriterion};
+pub use choice::{LEVELS, LinearMethod, LinearSolver, LinearTask, SolverChoice};
 pub use direct::Direct;
 pub use multigrid::Multigrid;
-pub use packed::Packed;
+pub use packed::PackedRows;
 
 use crate::system::vector::{dot, weighted_square};
-use crate::system::{FaceMatrices, Rows};
+use crate::system::{ConductionRows, FaceMatrices};
 use bicgstab::BiconjugateGradients;
 use cg::ConjugateGradients;
 
@@ -26,7 +26,7 @@ use cg::ConjugateGradients;
 #[derive(Clone, Copy)]
 pub struct Operator<'a> {
     /// Matrices M and K.
-    pub rows: &'a Rows,
+    pub rows: &'a ConductionRows,
     /// Diagonal D, lumped capacity and surfaces; `None` with consistent capacity.
     pub diagonal: Option<&'a [f64]>,
     /// Factors of M and K.
@@ -35,7 +35,7 @@ pub struct Operator<'a> {
     pub faces: &'a FaceMatrices,
     /// Packed single-precision rows for the iterations, if rows are unequal: A with consistent capacity, K
     /// with lumped capacity.
-    pub packed: Option<&'a Packed>,
+    pub packed: Option<&'a PackedRows>,
 }
 
 impl Operator<'_> {
@@ -88,8 +88,8 @@ impl Iterative {
         inverse: &[f64],
         residual: &mut [f64],
         solution: &mut [f64],
-        goal: &Goal,
-    ) -> Ended {
+        goal: &StoppingCriterion,
+    ) -> SolveOutcome {
         let Self { conjugate, biconjugate, multigrid } = self;
         if symmetric {
             conjugate.solve(multigrid.value.as_mut(), operator, inverse, residual, solution, goal)

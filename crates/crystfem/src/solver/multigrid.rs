@@ -18,7 +18,7 @@ pub struct Multigrid {
     /// Work vectors of the finest level.
     smoothed: Vec<f64>,
     left: Vec<f64>,
-    bottom: Bottom,
+    bottom: CoarsestLevel,
 }
 
 /// A level below the finest.
@@ -36,7 +36,7 @@ struct Level {
 
 /// Dense Cholesky factors of the last level.
 #[derive(Default)]
-struct Bottom {
+struct CoarsestLevel {
     factor: Vec<f64>,
 }
 
@@ -47,7 +47,7 @@ impl Multigrid {
             operator.rows.row(row, [0.0, 1.0]).for_each(|(column, value)| visit(column, value));
         });
         let levels = transfers.iter().map(|_| Level::default()).collect();
-        Self { transfers, levels, smoothed: Vec::new(), left: Vec::new(), bottom: Bottom::default() }
+        Self { transfers, levels, smoothed: Vec::new(), left: Vec::new(), bottom: CoarsestLevel::default() }
     }
 
     /// Updates the matrices of all levels, from the row sums `lumped` of capacity and surfaces, and the
@@ -75,7 +75,7 @@ impl Multigrid {
             }
         }
         if let (Some(last), Some(transfer)) = (self.levels.last(), self.transfers.last()) {
-            self.bottom = Bottom::new(&transfer.conduction, &last.values);
+            self.bottom = CoarsestLevel::new(&transfer.conduction, &last.values);
         }
     }
 
@@ -103,7 +103,7 @@ impl Multigrid {
 }
 
 /// Solves from the first of these levels down.
-fn cycle(transfers: &[Transfer], levels: &mut [Level], bottom: &Bottom) {
+fn cycle(transfers: &[Transfer], levels: &mut [Level], bottom: &CoarsestLevel) {
     let Some((own, below)) = levels.split_first_mut() else { return };
     let matrix = &transfers[0].conduction;
     if below.is_empty() {
@@ -126,7 +126,7 @@ fn cycle(transfers: &[Transfer], levels: &mut [Level], bottom: &Bottom) {
     combine(found, |row, own| own + inverse[row] * left[row]);
 }
 
-impl Bottom {
+impl CoarsestLevel {
     /// Factors the matrix; a vanishing pivot, of a body without support and capacity, is left out.
     fn new(pattern: &Sparse, values: &[f64]) -> Self {
         let size = pattern.rows();

@@ -6,7 +6,7 @@
 //! with that of A to about 2⁻²⁴ for long and short steps alike; conjugate gradients recompute the residual
 //! with A itself before the difference matters.
 
-use crate::system::Rows;
+use crate::system::ConductionRows;
 use crate::system::vector::CHUNK;
 use polycore::numerics::ordered_sum;
 use pulp::{Arch, Simd, WithSimd};
@@ -15,12 +15,12 @@ use rayon::prelude::*;
 /// Number of rows side by side.
 const LANES: usize = 8;
 /// Largest ratio of a block's entries to those of its longest row, for blocks whose rows share offsets.
-const MOST_SPREAD: f64 = 1.3;
+const MAX_SPREAD: f64 = 1.3;
 
 /// Packed rows of a combination of M and K.
 #[derive(Default)]
-pub struct Packed {
-    items: Vec<Kept>,
+pub struct PackedRows {
+    items: Vec<CachedItem>,
     /// Versions of rows, and factors, for which it was made.
     made_for: Option<([u64; 2], [u64; 2])>,
     any: bool,
@@ -28,7 +28,7 @@ pub struct Packed {
 
 /// A work item with its versions: births change few items.
 #[derive(Default)]
-struct Kept {
+struct CachedItem {
     /// `None` if rows are mostly equal.
     item: Option<Item>,
     /// Version of the pattern.
@@ -44,7 +44,7 @@ struct Item {
     core: Vec<f64>,
     /// Off-diagonal entries, block by block.
     values: Vec<[f32; LANES]>,
-    blocks: Vec<Block>,
+    blocks: Vec<RowBlock>,
     /// Distances from the diagonal, for banded blocks.
     offsets: Vec<i32>,
     /// Columns of the other blocks.
@@ -53,16 +53,16 @@ struct Item {
 
 /// A block of eight rows, or of the last ones.
 #[derive(Clone, Copy)]
-struct Block {
+struct RowBlock {
     /// Index of its first entry in `offsets` or `columns`.
     first: u32,
     count: u16,
     banded: bool,
 }
 
-impl Packed {
+impl PackedRows {
     /// Updates outdated work items; returns false if no rows are packed.
-    pub fn update(&mut self, rows: &Rows, weights: [f64; 2]) -> bool {
+    pub fn update(&mut self, rows: &ConductionRows, weights: [f64; 2]) -> bool {
         let factors = weights.map(f64::to_bits);
         // few distinct rows stay in caches unpacked
         if rows.are_few() {
@@ -71,7 +71,7 @@ impl Packed {
         }
         let made_for = Some((rows.versions(), factors));
         if self.made_for != made_for {
-            self.items.resize_with(rows.items(), Kept::default);
+            self.items.resize_with(rows.items(), CachedItem::default);
             self.items.par_iter_mut().enumerate().for_each(|(index, kept)| {
                 let [shape, values] = rows.versions_of(index);
                 if kept.shaped_for != Some(shape) {
@@ -91,7 +91,7 @@ impl Packed {
     /// Computes y = (diagonal + `factor`·A) x; returns x·y. `weights` are `factor` times those of A.
     pub fn product(
         &self,
-        rows: &Rows,
+        rows: &ConductionRows,
         diagonal: Option<&[f64]>,
         (factor, weights): (f64, [f64; 2]),
         x: &[f64],
@@ -102,9 +102,9 @@ impl Packed {
             Some(Some(item)) => {
                 let first = index * CHUNK;
                 let diagonal = diagonal.map(|diagonal| &diagonal[first..first + y.len()]);
-                arch.dispatch(Product { item, diagonal, factor, x, y, first })
+                arch.dispatch(PackedProduct { item, diagonal, factor, x, y, first })
             }
-            _ => rows.part::<false>(index, diagonal, weights, x, y),
+            _ => rows.multiply_item::<false>(index, diagonal, weights, x, y),
         };
         ordered_sum(y.par_chunks_mut(CHUNK).enumerate().map(part))
     }
@@ -112,7 +112,7 @@ impl Packed {
 
 impl Item {
     /// Builds the pattern of a work item.
-    fn new(rows: &Rows, index: usize) -> Self {
+    fn new(rows: &ConductionRows, index: usize) -> Self {
         let mut item = Self::default();
         let (start, end) = (index * CHUNK, ((index + 1) * CHUNK).min(rows.size()));
         item.core.resize(end - start, 0.0);
@@ -138,7 +138,7 @@ impl Item {
                 to >= 0 && to as usize + LANES <= rows.size()
             };
             let banded = lanes.len() == LANES
-                && offsets.len() as f64 <= MOST_SPREAD * most as f64
+                && offsets.len() as f64 <= MAX_SPREAD * most as f64
                 && offsets.first().is_none_or(inside)
                 && offsets.last().is_none_or(inside);
             if banded {
@@ -151,7 +151,7 @@ impl Item {
                         (item.offsets.len() - offsets.len()) as u32
                     }
                 };
-                item.blocks.push(Block { first: begin, count: offsets.len() as u16, banded });
+                item.blocks.push(RowBlock { first: begin, count: offsets.len() as u16, banded });
                 item.values.resize(item.values.len() + offsets.len(), [0.0; LANES]);
             } else {
                 let begin = item.columns.len();
@@ -162,7 +162,7 @@ impl Item {
                         columns[lane] = column as u32;
                     }
                 }
-                item.blocks.push(Block { first: begin as u32, count: most as u16, banded });
+                item.blocks.push(RowBlock { first: begin as u32, count: most as u16, banded });
                 item.values.resize(item.values.len() + most, [0.0; LANES]);
             }
         }
@@ -173,7 +173,7 @@ impl Item {
     }
 
     /// Fills in the entries for given factors.
-    fn fill(&mut self, rows: &Rows, index: usize, weights: [f64; 2]) {
+    fn fill(&mut self, rows: &ConductionRows, index: usize, weights: [f64; 2]) {
         self.values.fill([0.0; LANES]);
         let mut values = self.values.as_mut_slice();
         for (place, block) in self.blocks.iter().enumerate() {
@@ -203,14 +203,14 @@ impl Item {
     }
 }
 
-impl Block {
+impl RowBlock {
     fn range(self) -> std::ops::Range<usize> {
         self.first as usize..self.first as usize + usize::from(self.count)
     }
 }
 
 /// Product of one work item.
-struct Product<'a> {
+struct PackedProduct<'a> {
     item: &'a Item,
     diagonal: Option<&'a [f64]>,
     factor: f64,
@@ -219,7 +219,7 @@ struct Product<'a> {
     first: usize,
 }
 
-impl WithSimd for Product<'_> {
+impl WithSimd for PackedProduct<'_> {
     type Output = f64;
 
     #[inline(always)]
@@ -309,7 +309,7 @@ mod tests {
             of.iter().enumerate().for_each(|(name, &k)| names[k] = name);
             let name = |k: usize| names[k];
             let entry = |a: usize, b: usize| -1.0 - 0.5 * ((a.min(b) + 3 * a.max(b)) as f64).sin();
-            let rows = Rows::build(size, true, |row, out| {
+            let rows = ConductionRows::build(size, true, |row, out| {
                 out.begin(std::iter::once(row as u32));
                 let k = of[row];
                 let mut sum = 0.0;
@@ -325,7 +325,7 @@ mod tests {
                 }
                 out.add(0, sum, 1.0);
             });
-            let mut packed = Packed::default();
+            let mut packed = PackedRows::default();
             let diagonal: Vec<f64> = (0..size).map(|k| 1e-3 * (k as f64).cos().abs()).collect();
             let x: Vec<f64> = (0..size).map(|k| (k as f64).sin()).collect();
             let one = vec![1.0; size];
@@ -350,7 +350,7 @@ mod tests {
     /// Only work items with changed or appended rows are packed again; products equal those of rows made at
     /// once.
     #[test]
-    fn what_has_not_changed_is_kept() {
+    fn unchanged_items_are_kept() {
         let fill = |scale: f64| {
             move |row: usize, out: &mut Row| {
                 out.begin(std::iter::once(row as u32));
@@ -362,10 +362,10 @@ mod tests {
         let (before, size) = (3 * CHUNK - 5, 4 * CHUNK + 17);
         let changed: Vec<u32> =
             (CHUNK as u32 + 3..CHUNK as u32 + 9).chain(before as u32..size as u32).collect();
-        let mut rows = Rows::build(before, false, fill(1.0));
-        let mut packed = Packed::default();
+        let mut rows = ConductionRows::build(before, false, fill(1.0));
+        let mut packed = PackedRows::default();
         assert!(packed.update(&rows, [0.0, 1.0]));
-        let made = |packed: &Packed| -> Vec<Option<u64>> {
+        let made = |packed: &PackedRows| -> Vec<Option<u64>> {
             packed.items.iter().map(|kept| kept.shaped_for).collect()
         };
         let first = made(&packed);
@@ -374,10 +374,10 @@ mod tests {
         let second = made(&packed);
         assert_eq!(second.iter().zip(&first).map(|(a, b)| a == b).collect::<Vec<_>>(), [true, false, false]);
         assert_eq!(second.len(), 5);
-        let whole = Rows::build(size, false, |row, out: &mut Row| {
+        let whole = ConductionRows::build(size, false, |row, out: &mut Row| {
             fill(if changed.binary_search(&(row as u32)).is_ok() { 2.0 } else { 1.0 })(row, out);
         });
-        let mut fresh = Packed::default();
+        let mut fresh = PackedRows::default();
         assert!(fresh.update(&whole, [0.0, 1.0]));
         let x: Vec<f64> = (0..size).map(|k| (k as f64).cos()).collect();
         let [mut kept, mut exact] = [vec![0.0; size], vec![0.0; size]];
@@ -399,20 +399,23 @@ mod tests {
         };
         let size = 2 * CHUNK;
         let x: Vec<f64> = (0..size).map(|k| (k as f64).cos()).collect();
-        let product = |packed: &mut Packed, rows: &Rows| {
+        let product = |packed: &mut PackedRows, rows: &ConductionRows| {
             assert!(packed.update(rows, [0.0, 1.0]));
             let mut y = vec![0.0; size];
             packed.product(rows, None, (1.0, [0.0, 1.0]), &x, &mut y);
             y
         };
-        let mut rows = Rows::build(size, false, fill(true));
+        let mut rows = ConductionRows::build(size, false, fill(true));
         rows.keep();
-        let mut packed = Packed::default();
+        let mut packed = PackedRows::default();
         let first = product(&mut packed, &rows);
-        assert_eq!(first, product(&mut Packed::default(), &Rows::build(size, false, fill(false))));
+        assert_eq!(
+            first,
+            product(&mut PackedRows::default(), &ConductionRows::build(size, false, fill(false)))
+        );
         rows.add(77, 76, 10.0, 0.0);
         let added = product(&mut packed, &rows);
-        assert_eq!(added, product(&mut Packed::default(), &rows));
+        assert_eq!(added, product(&mut PackedRows::default(), &rows));
         let differ: Vec<usize> = (0..size).filter(|&row| added[row] != first[row]).collect();
         assert_eq!(differ, [77]);
         rows.restore();
@@ -421,11 +424,11 @@ mod tests {
 
     /// Equal rows are not packed.
     #[test]
-    fn equal_rows_are_left() {
-        let rows = Rows::build(10_000, false, |_, out| {
+    fn equal_rows_are_not_packed() {
+        let rows = ConductionRows::build(10_000, false, |_, out| {
             out.begin(std::iter::empty());
             out.add(0, 2.0, 0.0);
         });
-        assert!(!Packed::default().update(&rows, [0.0, 1.0]));
+        assert!(!PackedRows::default().update(&rows, [0.0, 1.0]));
     }
 }

@@ -4,16 +4,16 @@
 //! capacity, points and faces are rebuilt at the nodes of new elements only, and later entries of lists move.
 //! The result equals that of building everything at once, bit by bit.
 
-use super::around::Around;
-use super::classes::{Class, OWN, VARYING, classify, matrices};
-use super::general::General;
-use super::nodal::Nodal;
+use super::classes::{ElementClass, OWN, VARYING, classify, matrices};
+use super::general::ElementPoints;
+use super::nodal::NodalPoints;
+use super::node_elements::NodeElements;
 use super::numbering::Numbering;
-use super::rows::{Row, Rows};
-use super::surfaces::{Surfaces, Touched};
-use super::{Behaviour, NONE, System};
-use crate::boundary::{Condition, Where};
-use crate::element::{Geometry, MOST, WIDE, WIDE_POINTS};
+use super::rows::{ConductionRows, RowBuilder};
+use super::surfaces::{Surfaces, TouchedEquations};
+use super::{MaterialBehaviour, NONE, ThermalSystem};
+use crate::boundary::{Condition, FaceSelection};
+use crate::element::{FIRST_ORDER_NODES, Geometry, MAX_ELEMENT_NODES, MAX_ELEMENT_POINTS};
 use crate::error::Error;
 use crate::mesh::{Face, Mesh};
 use crate::problem::{Capacity, Problem};
@@ -25,7 +25,7 @@ const BATCH: usize = 4096;
 
 /// Moves of points from an index on.
 #[derive(Clone, Debug, Default)]
-pub struct Moves {
+pub struct PointMoves {
     /// First index that may have moved.
     pub first: usize,
     /// Former index of each point from there on, or [`NONE`].
@@ -39,20 +39,20 @@ pub struct Added {
     /// nodes.
     pub before: Vec<(u32, Option<f64>)>,
     /// Moves of points at nodes.
-    pub nodal: Moves,
+    pub nodal: PointMoves,
     /// Moves of points in elements.
-    pub general: Moves,
+    pub general: PointMoves,
     /// Number of visited elements: new ones and their neighbours.
     pub visited: u64,
 }
 
 /// Constant data of a problem, for assembly.
-pub struct Plan {
+pub struct AssemblyPlan {
     pub(super) numbering: Numbering,
-    around: Around,
+    around: NodeElements,
     /// Class of each element.
     kinds: Vec<u16>,
-    classes: Vec<Class>,
+    classes: Vec<ElementClass>,
     /// Faces on which each condition acts, or does not, by their corners.
     named: Vec<HashSet<[u32; 4]>>,
     /// Last condition that prescribes the temperature of a node.
@@ -62,31 +62,31 @@ pub struct Plan {
 }
 
 /// Geometry of an element outside all classes.
-enum Own {
+enum ElementGeometry {
     Narrow(Box<Geometry>),
-    Wide(Box<Geometry<WIDE, WIDE_POINTS>>),
+    Wide(Box<Geometry<MAX_ELEMENT_NODES, MAX_ELEMENT_POINTS>>),
 }
 
-impl Own {
+impl ElementGeometry {
     fn new(mesh: &Mesh, element: u32) -> Result<Self, Error> {
-        let geometry = if mesh.nodes(element).len() > MOST {
+        let geometry = if mesh.nodes(element).len() > FIRST_ORDER_NODES {
             mesh.geometry(element).map(|geometry| Self::Wide(Box::new(geometry)))
         } else {
-            let (corners, nodes) = mesh.positions::<MOST>(element);
+            let (corners, nodes) = mesh.positions::<FIRST_ORDER_NODES>(element);
             Geometry::new(&corners[..nodes]).map(|geometry| Self::Narrow(Box::new(geometry)))
         };
         geometry.ok_or_else(|| Error::Mesh(format!("element {element}: inverted")))
     }
 }
 
-impl Plan {
-    fn new(problem: &Problem, behaviours: &[Behaviour], born: &[u32]) -> Self {
+impl AssemblyPlan {
+    fn new(problem: &Problem, behaviours: &[MaterialBehaviour], born: &[u32]) -> Self {
         let mesh = &problem.mesh;
         let (kinds, classes) = classify(mesh, &problem.material_of, behaviours);
         let by_corners = |condition: &Condition| {
             let faces: &[Face] = match condition.surface() {
-                Some(Where::Faces(faces)) => faces,
-                Some(Where::Outer { except }) => except,
+                Some(FaceSelection::Faces(faces)) => faces,
+                Some(FaceSelection::Outer { except }) => except,
                 None => &[],
             };
             faces.iter().map(|&face| mesh.face_nodes(face).key()).collect()
@@ -104,7 +104,7 @@ impl Plan {
         };
         Self {
             numbering: Numbering::new(problem, born),
-            around: Around::new(mesh, &problem.absent),
+            around: NodeElements::new(mesh, &problem.absent),
             kinds,
             classes,
             named: problem.conditions.iter().map(by_corners).collect(),
@@ -117,8 +117,8 @@ impl Plan {
     fn acts(&self, problem: &Problem, condition: usize, face: Face) -> bool {
         let named = &self.named[condition];
         match problem.conditions[condition].surface() {
-            Some(Where::Faces(_)) => named.contains(&problem.mesh.face_nodes(face).key()),
-            Some(Where::Outer { .. }) => {
+            Some(FaceSelection::Faces(_)) => named.contains(&problem.mesh.face_nodes(face).key()),
+            Some(FaceSelection::Outer { .. }) => {
                 named.is_empty() || !named.contains(&problem.mesh.face_nodes(face).key())
             }
             None => false,
@@ -126,36 +126,36 @@ impl Plan {
     }
 }
 
-impl System {
+impl ThermalSystem {
     /// Assembles the elements that are born (entry in `born` not [`NONE`]) after `births` births.
     ///
     /// # Errors
     /// [`Error::Mesh`] for an inverted element.
     pub fn build(
         problem: &Problem,
-        behaviours: &[Behaviour],
+        behaviours: &[MaterialBehaviour],
         born: &[u32],
         births: usize,
     ) -> Result<Self, Error> {
         let consistent = problem.capacity == Capacity::Consistent;
-        let stride = |wanted: &dyn Fn(&Behaviour) -> bool| {
+        let stride = |wanted: &dyn Fn(&MaterialBehaviour) -> bool| {
             behaviours.iter().filter(|b| wanted(b)).map(|b| b.states).max().unwrap_or(0)
         };
-        let mut nodal = Nodal {
-            stride: stride(&Behaviour::nodal),
+        let mut nodal = NodalPoints {
+            stride: stride(&MaterialBehaviour::nodal),
             followers: behaviours.iter().map(|b| b.capacity.is_some()).collect(),
             energies: behaviours.iter().any(|b| b.nodal() && b.capacity.is_none()),
-            ..Nodal::laws_of(problem, behaviours)
+            ..NodalPoints::laws_of(problem, behaviours)
         };
-        let plan = Plan::new(problem, behaviours, born);
+        let plan = AssemblyPlan::new(problem, behaviours, born);
         nodal.weighed = nodal.energies || plan.kinds.contains(&OWN);
         let mut system = Self {
             elements: 0,
             equation: vec![NONE; problem.mesh.points.len()],
-            rows: Rows::new(consistent),
+            rows: ConductionRows::new(consistent),
             capacity: Vec::new(),
             nodal,
-            general: General::new(stride(&|b| b.conductivity.is_none())),
+            general: ElementPoints::new(stride(&|b| b.conductivity.is_none())),
             surfaces: Surfaces::new(problem),
             fixed: Vec::new(),
             free: Vec::new(),
@@ -172,12 +172,12 @@ impl System {
 
     /// Born elements of an equation's node, ascending, with the local number of the node.
     pub fn around(&self, equation: u32, born: &[u32]) -> impl Iterator<Item = (u32, usize)> {
-        self.plan.around.of(self.nodes()[equation as usize], born)
+        self.plan.around.elements_of(self.nodes()[equation as usize], born)
     }
 
     /// Mass ρV of a point at a node, kg.
     pub fn mass(&self, problem: &Problem, born: &[u32], equation: usize, point: usize) -> f64 {
-        let Nodal { birth, material, mass, weighed, like, .. } = &self.nodal;
+        let NodalPoints { birth, material, mass, weighed, like, .. } = &self.nodal;
         if *weighed {
             return mass[point];
         }
@@ -200,7 +200,7 @@ impl System {
     pub fn add(
         &mut self,
         problem: &Problem,
-        behaviours: &[Behaviour],
+        behaviours: &[MaterialBehaviour],
         born: &[u32],
         births: usize,
         new: &[u32],
@@ -209,11 +209,11 @@ impl System {
         let size = self.plan.numbering.end(births);
         self.capacity.resize(size, 0.0);
         self.free.resize(size, 0.0);
-        let mut touched = Touched::new(size);
+        let mut touched = TouchedEquations::new(size);
         let mut fresh = Vec::new();
         for &node in new.iter().flat_map(|&element| mesh.nodes(element)) {
             if self.equation[node as usize] == NONE {
-                let around = self.plan.around.of(node, born);
+                let around = self.plan.around.elements_of(node, born);
                 let first = around.map(|(element, _)| born[element as usize]).min().unwrap_or(NONE);
                 let Some(equation) = self.plan.numbering.equation(node, first) else {
                     return Err(Error::Mesh(format!("node {node} of birth {first}: has no equation")));
@@ -237,7 +237,7 @@ impl System {
         if old == 0 {
             ring.extend_from_slice(new);
         } else {
-            let around = |&e: &u32| self.plan.around.of(self.nodes()[e as usize], born);
+            let around = |&e: &u32| self.plan.around.elements_of(self.nodes()[e as usize], born);
             ring.extend(touched.list.iter().flat_map(around).map(|(element, _)| element));
             ring.sort_unstable();
             ring.dedup();
@@ -246,10 +246,10 @@ impl System {
         self.elements += new.len();
         self.connect(mesh, born, size, &touched);
         let Self { plan, nodal, .. } = self;
-        if behaviours.iter().any(Behaviour::nodal) {
+        if behaviours.iter().any(MaterialBehaviour::nodal) {
             let like = nodal.like.clone();
             added.nodal = nodal.replace(size, &touched.list, |equation, keys| {
-                for (element, _) in plan.around.of(plan.numbering.nodes[equation as usize], born) {
+                for (element, _) in plan.around.elements_of(plan.numbering.nodes[equation as usize], born) {
                     let material = usize::from(problem.material_of[element as usize]);
                     let key = (born[element as usize], like[material]);
                     if behaviours[material].nodal() && !keys.contains(&key) {
@@ -268,7 +268,7 @@ impl System {
         if !self.general.is_empty() {
             self.rows.keep();
         }
-        self.act(problem, born, &ring, &touched, &volumes);
+        self.update_surfaces(problem, born, &ring, &touched, &volumes);
         for &equation in &fresh {
             if let Some(&condition) = self.plan.held.get(&self.nodes()[equation as usize]) {
                 self.fixed.push((equation, condition));
@@ -283,11 +283,11 @@ impl System {
     }
 
     /// Assembles the rows of touched equations.
-    fn connect(&mut self, mesh: &Mesh, born: &[u32], size: usize, touched: &Touched) {
+    fn connect(&mut self, mesh: &Mesh, born: &[u32], size: usize, touched: &TouchedEquations) {
         let Self { rows, plan, equation, .. } = self;
-        let Plan { around, kinds, classes, numbering, .. } = plan;
-        rows.update(size, &touched.list, |index, row: &mut Row| {
-            let around = || around.of(numbering.nodes[index], born);
+        let AssemblyPlan { around, kinds, classes, numbering, .. } = plan;
+        rows.update(size, &touched.list, |index, row: &mut RowBuilder| {
+            let around = || around.elements_of(numbering.nodes[index], born);
             // corners, classes and relative nodes of the surrounding elements determine a row, except for
             // elements outside all classes
             let repeated = row.begin(around().flat_map(|(element, corner)| {
@@ -317,22 +317,22 @@ impl System {
     fn add_elements(
         &mut self,
         problem: &Problem,
-        behaviours: &[Behaviour],
+        behaviours: &[MaterialBehaviour],
         born: &[u32],
         elements: &[u32],
-        touched: &Touched,
-    ) -> Result<Vec<(u32, [f64; MOST])>, Error> {
+        touched: &TouchedEquations,
+    ) -> Result<Vec<(u32, [f64; FIRST_ORDER_NODES])>, Error> {
         let mesh = &problem.mesh;
         let mut volumes = Vec::new();
         for elements in elements.chunks(BATCH) {
-            let Plan { kinds, classes, .. } = &self.plan;
+            let AssemblyPlan { kinds, classes, .. } = &self.plan;
             // most elements have none
-            let own: Vec<Option<Own>> = elements
+            let own: Vec<Option<ElementGeometry>> = elements
                 .par_iter()
                 .with_min_len(64)
                 .map(|&element| match usize::from(kinds[element as usize]) < classes.len() {
                     true => Ok(None),
-                    false => Own::new(mesh, element).map(Some),
+                    false => ElementGeometry::new(mesh, element).map(Some),
                 })
                 .collect::<Result<_, _>>()?;
             for (&element, geometry) in elements.iter().zip(own) {
@@ -341,19 +341,21 @@ impl System {
                 let behaviour = &behaviours[usize::from(material)];
                 let nodes = mesh.nodes(element);
                 match geometry.as_ref().filter(|_| kind == OWN) {
-                    Some(Own::Narrow(geometry)) => {
+                    Some(ElementGeometry::Narrow(geometry)) => {
                         self.add_own(nodes, &matrices(geometry, behaviour), touched);
                     }
-                    Some(Own::Wide(geometry)) => self.add_own(nodes, &matrices(geometry, behaviour), touched),
+                    Some(ElementGeometry::Wide(geometry)) => {
+                        self.add_own(nodes, &matrices(geometry, behaviour), touched)
+                    }
                     None => {}
                 }
                 let corner_volumes = match geometry.as_ref() {
-                    Some(Own::Narrow(geometry)) => &geometry.corner_volumes[..],
-                    Some(Own::Wide(geometry)) => &geometry.corner_volumes[..],
+                    Some(ElementGeometry::Narrow(geometry)) => &geometry.corner_volumes[..],
+                    Some(ElementGeometry::Wide(geometry)) => &geometry.corner_volumes[..],
                     None => &self.plan.classes[usize::from(kind)].volumes[..],
                 };
-                if let Some(volume) = corner_volumes.first_chunk::<MOST>()
-                    && nodes.len() <= MOST
+                if let Some(volume) = corner_volumes.first_chunk::<FIRST_ORDER_NODES>()
+                    && nodes.len() <= FIRST_ORDER_NODES
                     && self.plan.heated.iter().any(|list| list.binary_search(&element).is_ok())
                 {
                     volumes.push((element, *volume));
@@ -369,7 +371,7 @@ impl System {
                     if behaviour.nodal() && self.nodal.weighed {
                         let key = (born[element as usize], self.nodal.like[usize::from(material)]);
                         let density = problem.materials[usize::from(material)].density();
-                        for point in self.nodal.of(node as usize) {
+                        for point in self.nodal.points_of(node as usize) {
                             if (self.nodal.birth[point], self.nodal.material[point]) == key {
                                 self.nodal.mass[point] += density * volume;
                             }
@@ -386,7 +388,7 @@ impl System {
         &mut self,
         nodes: &[u32],
         (conduction, capacity): &([[f64; N]; N], [[f64; N]; N]),
-        touched: &Touched,
+        touched: &TouchedEquations,
     ) {
         for (a, &row) in nodes.iter().enumerate() {
             let row = self.equation[row as usize];
@@ -401,20 +403,20 @@ impl System {
     }
 
     /// Updates conditions on the outer surface, and sources, at touched equations.
-    fn act(
+    fn update_surfaces(
         &mut self,
         problem: &Problem,
         born: &[u32],
         elements: &[u32],
-        touched: &Touched,
-        volumes: &[(u32, [f64; MOST])],
+        touched: &TouchedEquations,
+        volumes: &[(u32, [f64; FIRST_ORDER_NODES])],
     ) {
         let Self { plan, surfaces, equation, consistent, .. } = self;
         let mesh = &problem.mesh;
         if problem.conditions.iter().any(|condition| condition.surface().is_some()) {
             let wanted = |node: u32| touched.contains(equation[node as usize]);
             let exposed = plan.around.outer(mesh, born, elements, wanted);
-            surfaces.act(problem, &exposed, equation, *consistent, touched, |condition, face| {
+            surfaces.set_condition(problem, &exposed, equation, *consistent, touched, |condition, face| {
                 plan.acts(problem, condition, face)
             });
         }
@@ -424,7 +426,7 @@ impl System {
                 let first = heated.partition_point(|&element| element < number);
                 for _ in heated[first..].iter().take_while(|&&element| element == number) {
                     let nodes = mesh.nodes(number);
-                    if nodes.len() > MOST {
+                    if nodes.len() > FIRST_ORDER_NODES {
                         let Some(geometry) = mesh.geometry(number) else { continue };
                         let equation = |a: usize| equation[nodes[a] as usize];
                         let mass = geometry.mass();
@@ -438,7 +440,7 @@ impl System {
                     }
                 }
             }
-            surfaces.release(source, list, pairs, touched);
+            surfaces.set_source(source, list, pairs, touched);
         }
     }
 }

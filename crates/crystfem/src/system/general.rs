@@ -12,11 +12,11 @@
 //! Jaeger, §1.6), exact at the nodes of a line at steady state; its tangent ∇N_a·D∇N_b k(T_b) is complete,
 //! and not symmetric.
 
-use super::rows::Rows;
-use super::{Evaluation, Moves, NONE, Points, StepInput};
-use crate::element::{self, Geometry, MOST, WIDE, WIDE_POINTS};
+use super::rows::ConductionRows;
+use super::{Evaluation, NONE, PointMoves, PointStates, StepInput};
+use crate::element::{self, FIRST_ORDER_NODES, Geometry, MAX_ELEMENT_NODES, MAX_ELEMENT_POINTS};
 use crate::error::Error;
-use crate::material::Point;
+use crate::material::PointInput;
 use crate::mesh::Mesh;
 use crate::problem::Problem;
 use nalgebra::Vector3;
@@ -29,7 +29,7 @@ const BATCH: usize = 64 * ITEM;
 
 /// Elements with material points.
 #[derive(Clone, Debug, Default)]
-pub struct General {
+pub struct ElementPoints {
     /// Elements of the mesh, ascending.
     pub elements: Vec<u32>,
     /// First point of each element, and the number of points.
@@ -45,7 +45,7 @@ pub struct General {
 }
 
 /// Contribution of an element.
-struct Part<const N: usize> {
+struct ElementContribution<const N: usize> {
     change: [f64; N],
     rate: [f64; N],
     capacity: [f64; N],
@@ -54,17 +54,17 @@ struct Part<const N: usize> {
     ratio: Option<f64>,
 }
 
-impl General {
+impl ElementPoints {
     /// Returns an empty set with `stride` state variables a point.
     pub fn new(stride: usize) -> Self {
         Self { starts: vec![0], stride, ..Self::default() }
     }
 
     /// Inserts elements, ascending; returns the moves of points.
-    pub fn insert(&mut self, mesh: &Mesh, new: &[u32], equation: &[u32]) -> Moves {
+    pub fn insert(&mut self, mesh: &Mesh, new: &[u32], equation: &[u32]) -> PointMoves {
         let first =
             new.first().map_or(self.elements.len(), |least| self.elements.partition_point(|e| e < least));
-        let mut moves = Moves { first: self.starts[first] as usize, from: Vec::new() };
+        let mut moves = PointMoves { first: self.starts[first] as usize, from: Vec::new() };
         self.equations.truncate(first.checked_sub(1).map_or(0, |before| self.ends[before] as usize));
         let points = self.starts.split_off(first + 1);
         let kept = self.elements.split_off(first);
@@ -113,14 +113,16 @@ impl General {
         problem: &Problem,
         consistent: bool,
         at: &StepInput,
-        old: &Points,
-        rows: &mut Rows,
+        old: &PointStates,
+        rows: &mut ConductionRows,
         out: &mut Evaluation,
     ) -> Result<(), Error> {
         if problem.mesh.is_second_order() {
-            return self.evaluate_all::<WIDE, WIDE_POINTS>(problem, consistent, at, old, rows, out);
+            return self.evaluate_all::<MAX_ELEMENT_NODES, MAX_ELEMENT_POINTS>(
+                problem, consistent, at, old, rows, out,
+            );
         }
-        self.evaluate_all::<MOST, MOST>(problem, consistent, at, old, rows, out)
+        self.evaluate_all::<FIRST_ORDER_NODES, FIRST_ORDER_NODES>(problem, consistent, at, old, rows, out)
     }
 
     fn evaluate_all<const N: usize, const P: usize>(
@@ -128,8 +130,8 @@ impl General {
         problem: &Problem,
         consistent: bool,
         at: &StepInput,
-        old: &Points,
-        rows: &mut Rows,
+        old: &PointStates,
+        rows: &mut ConductionRows,
         out: &mut Evaluation,
     ) -> Result<(), Error> {
         let mut memory = std::mem::take(&mut out.memory.general);
@@ -148,7 +150,7 @@ impl General {
                 work.push((start..end, here, energies));
                 (state, energy) = (rest, others);
             }
-            let parts: Vec<Vec<Part<N>>> = work
+            let parts: Vec<Vec<ElementContribution<N>>> = work
                 .into_par_iter()
                 .map(|(range, state, energy)| {
                     let offset = self.starts[range.start] as usize;
@@ -192,11 +194,11 @@ impl General {
         problem: &Problem,
         consistent: bool,
         at: &StepInput,
-        old: &Points,
+        old: &PointStates,
         index: usize,
         state: &mut [f64],
         energy: &mut [f64],
-    ) -> Result<Part<N>, Error> {
+    ) -> Result<ElementContribution<N>, Error> {
         let number = self.elements[index];
         let (corners, nodes) = problem.mesh.positions::<N>(number);
         let material = &*problem.materials[usize::from(problem.material_of[number as usize])];
@@ -211,7 +213,7 @@ impl General {
             let equation = equations[a] as usize;
             (start[a], end[a]) = (at.start[equation], at.temperature[equation]);
         }
-        let mut part = Part {
+        let mut part = ElementContribution {
             change: [0.0; N],
             rate: [0.0; N],
             capacity: [0.0; N],
@@ -246,7 +248,7 @@ impl General {
                 None => 1.0,
             };
             gradient /= own;
-            let place = Point { temperature: from, increment: to - from, gradient, dt: at.dt };
+            let place = PointInput { temperature: from, increment: to - from, gradient, dt: at.dt };
             let old_state = &old.state[(first + g) * self.stride..];
             let new_state = &mut state[g * self.stride..];
             let response = material.respond(&place, &old_state[..count], &mut new_state[..count])?;

@@ -1,35 +1,37 @@
 //! Equations of the existing elements: Eq. (4.16) discretized in space, independent of the time integrator.
 //!
-//! At each node i
-//! dE_i/dt + Q_i = 0, E_i = ∫ N_i ρU dV, Q_i = −∫ ∇N_i·f dV + ∮ N_i q dA − ∫ N_i r dV,
-//! with the energy E_i and the heat Q_i that leaves the node. A [`System`] grows when elements appear; nodes
-//! without existing elements have no equation. It holds the pattern and constant coefficients;
-//! [`System::evaluate`] computes E, Q and their tangents at a temperature.
+//! At each node i, with the energy E_i and the heat Q_i that leaves the node,
+//!
+//! dE_i/dt + Q_i = 0, E_i = ∫ N_i ρU dV, Q_i = −∫ ∇N_i·f dV + ∮ N_i q dA − ∫ N_i r dV.
+//!
+//! A [`ThermalSystem`] grows when elements appear; nodes without existing elements have no equation. It holds
+//! the pattern and constant coefficients; [`ThermalSystem::evaluate`] computes E, Q and their tangents at a
+//! temperature.
 //!
 //! There are three kinds of materials: linear ones have no points; those with only the conductivity constant
 //! are evaluated at nodes (one point per node, material and birth); all others at the integration points of
 //! each element.
 
-mod around;
 mod build;
 mod classes;
 mod general;
 mod nodal;
+mod node_elements;
 mod numbering;
 mod rows;
 mod surfaces;
 pub mod vector;
 
-pub use build::{Added, Moves};
-pub use general::General;
-pub use nodal::Nodal;
+pub use build::{Added, PointMoves};
+pub use general::ElementPoints;
+pub use nodal::NodalPoints;
 #[cfg(test)]
-pub use rows::Row;
-pub use rows::{Diagonal, Rows};
+pub use rows::RowBuilder;
+pub use rows::{ConductionRows, Diagonal};
 pub use surfaces::{Exchange, FaceMatrices, Surfaces};
 
 use crate::error::Error;
-use crate::material::{Point, ThermalMaterial};
+use crate::material::{PointInput, ThermalMaterial};
 use crate::problem::{Capacity, Problem};
 use nalgebra::{Matrix3, Vector3};
 
@@ -38,7 +40,7 @@ pub const NONE: u32 = u32::MAX;
 
 /// Constant properties of a material.
 #[derive(Clone, Copy, Debug)]
-pub struct Behaviour {
+pub struct MaterialBehaviour {
     /// Conductivity k, W/(m K), if constant.
     pub conductivity: Option<Matrix3<f64>>,
     /// Heat capacity ρc, J/(m³ K), if U is linear in T.
@@ -49,19 +51,19 @@ pub struct Behaviour {
     pub potential: bool,
 }
 
-impl Behaviour {
+impl MaterialBehaviour {
     /// Returns true if the material has points at nodes.
     pub fn nodal(&self) -> bool {
         self.conductivity.is_some() && (self.capacity.is_none() || self.states > 0)
     }
 }
 
-impl Behaviour {
+impl MaterialBehaviour {
     /// Evaluates the material once to find its constant properties.
     ///
     /// # Errors
     /// Errors of the material; [`Error::Parameter`] for a conductivity or a capacity that is not positive.
-    pub fn of(material: &dyn ThermalMaterial, capacity: Capacity) -> Result<Self, Error> {
+    pub fn from_material(material: &dyn ThermalMaterial, capacity: Capacity) -> Result<Self, Error> {
         let states = material.state_names().len();
         let linear = material.is_linear();
         let potential = material.potential(300.0).is_some();
@@ -69,7 +71,7 @@ impl Behaviour {
         if !linear && (capacity == Capacity::Consistent || !material.constant_conductivity()) {
             return Ok(behaviour);
         }
-        let at = Point { temperature: 300.0, increment: 0.0, gradient: Vector3::zeros(), dt: 1.0 };
+        let at = PointInput { temperature: 300.0, increment: 0.0, gradient: Vector3::zeros(), dt: 1.0 };
         let mut old = vec![0.0; states];
         material.initial_state(at.temperature, &mut old);
         let mut new = old.clone();
@@ -101,7 +103,7 @@ impl Behaviour {
 
 /// States and energies of material points.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Points {
+pub struct PointStates {
     /// State variables, point by point.
     pub state: Vec<f64>,
     /// Energies U, J/kg; empty at nodes if all materials are linear.
@@ -110,11 +112,11 @@ pub struct Points {
 
 /// Material points at nodes and in elements.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Memory {
+pub struct PointMemory {
     /// Points at nodes.
-    pub nodal: Points,
+    pub nodal: PointStates,
     /// Points in elements.
-    pub general: Points,
+    pub general: PointStates,
 }
 
 /// Input of an evaluation.
@@ -150,7 +152,7 @@ pub struct Evaluation {
     /// Smallest ratio of next to present increment requested by a material.
     pub step_ratio: Option<f64>,
     /// Points at the end of the increment.
-    pub memory: Memory,
+    pub memory: PointMemory,
     /// Number of calls of `respond`.
     pub responses: u64,
     scratch: Vec<f64>,
@@ -158,25 +160,25 @@ pub struct Evaluation {
 
 impl Evaluation {
     /// ∂E_i/∂T_i, J/K; row sums with consistent capacity.
-    pub fn capacity<'a>(&'a self, system: &'a System) -> &'a [f64] {
+    pub fn capacity<'a>(&'a self, system: &'a ThermalSystem) -> &'a [f64] {
         if self.capacity.is_empty() { &system.capacity } else { &self.capacity }
     }
 }
 
 /// Equations of the existing elements.
-pub struct System {
+pub struct ThermalSystem {
     /// Number of elements.
     pub elements: usize,
     /// Equation of each node of the mesh, or [`NONE`].
     pub equation: Vec<u32>,
     /// Conduction K, and M with consistent capacity.
-    pub rows: Rows,
+    pub rows: ConductionRows,
     /// Capacity of linear materials, row sums, J/K.
     pub capacity: Vec<f64>,
     /// Points at nodes.
-    pub nodal: Nodal,
+    pub nodal: NodalPoints,
     /// Points in elements.
-    pub general: General,
+    pub general: ElementPoints,
     /// Conditions on faces, and sources.
     pub surfaces: Surfaces,
     /// Equations with prescribed temperature and their conditions, ascending.
@@ -191,10 +193,10 @@ pub struct System {
     pub generation: u64,
     /// Time of the last evaluation, s.
     evaluated_at: f64,
-    plan: build::Plan,
+    plan: build::AssemblyPlan,
 }
 
-impl System {
+impl ThermalSystem {
     /// Number of equations, including those out of use.
     pub fn size(&self) -> usize {
         self.capacity.len()
@@ -222,7 +224,7 @@ impl System {
                 &problem.conditions[condition as usize]
             {
                 let node = self.nodes()[equation as usize];
-                temperature[equation as usize] = value.at(problem.mesh.points[node as usize], time);
+                temperature[equation as usize] = value.value_at(problem.mesh.points[node as usize], time);
             }
         }
     }
@@ -235,7 +237,7 @@ impl System {
         &mut self,
         problem: &Problem,
         at: &StepInput,
-        old: &Memory,
+        old: &PointMemory,
         out: &mut Evaluation,
     ) -> Result<(), Error> {
         let size = self.size();

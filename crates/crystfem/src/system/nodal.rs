@@ -5,9 +5,9 @@
 //! would need.
 
 use super::vector::{CHUNK, items};
-use super::{Behaviour, Evaluation, Moves, NONE, Points, StepInput};
+use super::{Evaluation, MaterialBehaviour, NONE, PointMoves, PointStates, StepInput};
 use crate::error::Error;
-use crate::material::{Crystallization, Increments, Point, Scratch, ThermalMaterial};
+use crate::material::{Crystallization, Increments, PointInput, Scratch, ThermalMaterial};
 use crate::problem::Problem;
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 /// Points at nodes, in the order of the nodes.
 #[derive(Clone, Debug, Default)]
-pub struct Nodal {
+pub struct NodalPoints {
     /// First point of each node, and at the end the number of points.
     pub starts: Vec<u32>,
     /// Material of each point, one of `like`.
@@ -24,7 +24,7 @@ pub struct Nodal {
     /// Birth of each point.
     pub birth: Vec<u32>,
     /// Mass ρV, kg; empty if energies are linear and all elements belong to a class: see
-    /// [`super::System::mass`].
+    /// [`super::ThermalSystem::mass`].
     pub mass: Vec<f64>,
     /// True if masses are stored.
     pub weighed: bool,
@@ -45,7 +45,7 @@ pub struct Nodal {
     pub like: Vec<u16>,
 }
 
-/// Buffers for one work item of [`Nodal::follow`].
+/// Buffers for one work item of [`NodalPoints::follow`].
 #[derive(Default)]
 struct PointScratch {
     /// Points of one law, and their nodes, both within the item.
@@ -56,11 +56,11 @@ struct PointScratch {
     before: Vec<f64>,
 }
 
-impl Nodal {
+impl NodalPoints {
     /// Returns an empty set with the laws of the followers.
-    pub fn laws_of(problem: &Problem, behaviours: &[Behaviour]) -> Self {
+    pub fn laws_of(problem: &Problem, behaviours: &[MaterialBehaviour]) -> Self {
         let mut laws: Vec<Crystallization> = Vec::new();
-        let mut law = |(material, behaviour): (&Arc<dyn ThermalMaterial>, &Behaviour)| {
+        let mut law = |(material, behaviour): (&Arc<dyn ThermalMaterial>, &MaterialBehaviour)| {
             let own =
                 material.crystals().filter(|_| behaviour.capacity.is_some() && behaviour.states == 1)?;
             let known = laws.iter().position(|law| law == own);
@@ -84,7 +84,7 @@ impl Nodal {
     }
 
     /// Points of a node.
-    pub fn of(&self, node: usize) -> std::ops::Range<usize> {
+    pub fn points_of(&self, node: usize) -> std::ops::Range<usize> {
         if self.is_empty() { 0..0 } else { self.starts[node] as usize..self.starts[node + 1] as usize }
     }
 
@@ -100,7 +100,7 @@ impl Nodal {
         size: usize,
         touched: &[u32],
         mut keys: impl FnMut(u32, &mut Vec<(u32, u16)>),
-    ) -> Moves {
+    ) -> PointMoves {
         if self.starts.is_empty() {
             self.starts.push(0);
         }
@@ -109,7 +109,7 @@ impl Nodal {
         let ends = self.starts.split_off(first + 1);
         let (birth, material) = (self.birth.split_off(start), self.material.split_off(start));
         let mass = if self.weighed { self.mass.split_off(start) } else { Vec::new() };
-        let mut moves = Moves { first: start, from: Vec::new() };
+        let mut moves = PointMoves { first: start, from: Vec::new() };
         let mut touched = touched.iter().peekable();
         let mut list = Vec::new();
         let mut begin = 0;
@@ -144,7 +144,7 @@ impl Nodal {
         &self,
         problem: &Problem,
         at: &StepInput,
-        old: &Points,
+        old: &PointStates,
         out: &mut Evaluation,
     ) -> Result<(), Error> {
         if self.coupled {
@@ -155,8 +155,8 @@ impl Nodal {
     }
 
     /// Restores the states of followers in `new` from `old`.
-    pub fn keep_followers(&self, old: &Points, new: &mut Points) {
-        let Points { state, energy } = new;
+    pub fn keep_followers(&self, old: &PointStates, new: &mut PointStates) {
+        let PointStates { state, energy } = new;
         if !self.coupled {
             state.clone_from(&old.state);
             energy.clone_from(&old.energy);
@@ -212,7 +212,7 @@ impl Nodal {
         let place = |node: usize| {
             let start = at.start[node];
             let increment = at.temperature[node] - start;
-            Point { temperature: start, increment, gradient: Vector3::zeros(), dt: at.dt }
+            PointInput { temperature: start, increment, gradient: Vector3::zeros(), dt: at.dt }
         };
         let PointScratch { points, nodes, z, scratch, before } = room;
         let (mut ratio, mut count): (Option<f64>, u64) = (None, 0);
@@ -221,7 +221,7 @@ impl Nodal {
             points.clear();
             nodes.clear();
             for (k, node) in (0..).zip(range.clone()) {
-                for point in self.of(node).filter(|&point| law_of(point) == Some(number)) {
+                for point in self.points_of(node).filter(|&point| law_of(point) == Some(number)) {
                     if nodes.last() != Some(&k) {
                         place(node).check()?;
                     }
@@ -247,7 +247,7 @@ impl Nodal {
             count += points.len() as u64;
         }
         for node in range {
-            for point in self.of(node) {
+            for point in self.points_of(node) {
                 let index = self.material[point];
                 if !self.follows(index) || law_of(point).is_some() {
                     continue;
@@ -268,7 +268,7 @@ impl Nodal {
         &self,
         problem: &Problem,
         at: &StepInput,
-        old: &Points,
+        old: &PointStates,
         out: &mut Evaluation,
     ) -> Result<Option<f64>, Error> {
         let Evaluation { change, capacity, memory, .. } = out;
@@ -303,7 +303,7 @@ impl Nodal {
         &self,
         problem: &Problem,
         at: &StepInput,
-        old: &Points,
+        old: &PointStates,
         first: usize,
         change: &mut [f64],
         capacity: &mut [f64],
@@ -314,13 +314,13 @@ impl Nodal {
         let offset = self.starts[first] as usize;
         for k in 0..change.len() {
             let start = at.start[first + k];
-            let place = Point {
+            let place = PointInput {
                 temperature: start,
                 increment: at.temperature[first + k] - start,
                 gradient: Vector3::zeros(),
                 dt: at.dt,
             };
-            for point in self.of(first + k) {
+            for point in self.points_of(first + k) {
                 if self.follows(self.material[point]) {
                     continue;
                 }

@@ -9,9 +9,9 @@ use super::NONE;
 use crate::problem::Problem;
 
 /// Smallest number of equations of a group, unless node numbers separate it.
-const SMALLEST: usize = 256;
+const MIN_GROUP: usize = 256;
 /// Ratio of earlier equations to those of a group.
-const PART: usize = 8;
+const GROUP_RATIO: usize = 8;
 
 /// Order of all nodes that ever exist.
 #[derive(Clone, Debug)]
@@ -56,7 +56,7 @@ impl Numbering {
         let (mut start, mut end, mut top) = (0, 0, 0);
         for (birth, &(count, _, high)) in come.iter().enumerate() {
             (end, top) = (end + count, high.max(top));
-            if birth == 0 || later[birth] > top || end - start >= SMALLEST.max(start / PART) {
+            if birth == 0 || later[birth] > top || end - start >= MIN_GROUP.max(start / GROUP_RATIO) {
                 groups.resize(birth + 1, [start as u32, end as u32]);
                 start = end;
             }
@@ -95,7 +95,7 @@ impl Numbering {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::material::{Conductor, Property};
+    use crate::material::{Conductor, ThermalProperty};
     use crate::mesh::Grid;
     use crate::problem::Birth;
     use std::sync::Arc;
@@ -103,7 +103,7 @@ mod tests {
     /// Returns a block of 8 × 8 × 6 on which `births` are laid.
     fn problem(births: Vec<Vec<u32>>) -> (Problem, Vec<u32>) {
         let mesh = Grid::uniform([0.0; 3], [1.0; 3], [8, 8, 6]).unwrap().mesh("block").unwrap();
-        let constant = |name| Property::constant(name, 1.0).unwrap();
+        let constant = |name| ThermalProperty::constant(name, 1.0).unwrap();
         let material = Arc::new(Conductor::new(1.0, constant("k"), constant("c")).unwrap());
         let mut born = vec![0; 384];
         births.iter().flatten().for_each(|&element| born[element as usize] = NONE);
@@ -142,7 +142,7 @@ mod tests {
                 assert_eq!(found.nodes[equation as usize], *node);
                 assert!((equation as usize) < found.end(number as usize));
             }
-            assert!(found.end(number as usize) - seen.len() <= SMALLEST);
+            assert!(found.end(number as usize) - seen.len() <= MIN_GROUP);
         }
     }
 }

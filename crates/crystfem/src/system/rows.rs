@@ -2,7 +2,7 @@
 //! values stored once.
 //!
 //! A row is a list of offsets, column − row, and a list of values. On a mesh with lines of equal elements
-//! most consecutive rows are equal; a run of them is one segment, y_i = Σ_k v_k x_{i+o_k}, a stencil without
+//! most consecutive rows are equal; a run of them is a stencil, y_i = Σ_k v_k x_{i+o_k}, without
 //! index gathers. Otherwise this is a compressed row format, and partly filled cells have few distinct lists,
 //! which stay in caches. Each row is written once, without colouring or sums across threads, so that the bits
 //! do not depend on threads; the cost equals that of scattering because a stencil has 27 products and the
@@ -13,22 +13,22 @@ mod stencils;
 
 use super::vector::{CHUNK, items};
 use polycore::numerics::ordered_sum;
-use product::{Both, Product};
+use product::{FlowAndCapacity, RowsProduct};
 use pulp::Arch;
 use rayon::prelude::*;
-use stencils::{Entries, Stencil, Stencils};
+use stencils::{Entries, RowStencil, Stencils};
 
 /// A run of equal rows of one work item; `start` counts within the item.
 #[derive(Clone, Copy, Debug)]
-struct Segment {
+struct RowRun {
     start: u16,
     length: u16,
-    stencil: Stencil,
+    stencil: RowStencil,
 }
 
 /// A row under construction.
 #[derive(Debug, Default)]
-pub struct Row {
+pub struct RowBuilder {
     entries: Vec<(i32, f64, f64)>,
     /// The entries, sorted, list by list.
     offsets: Vec<i32>,
@@ -40,7 +40,7 @@ pub struct Row {
     repeated: bool,
 }
 
-impl Row {
+impl RowBuilder {
     /// Begins a row with its determinants. Returns true if they equal those of the row before: then nothing
     /// needs to be added.
     pub fn begin(&mut self, determinants: impl Iterator<Item = u32>) -> bool {
@@ -84,14 +84,14 @@ impl Row {
 
 /// Matrices K and, with consistent capacity, M, over the existing nodes.
 #[derive(Clone, Debug)]
-pub struct Rows {
+pub struct ConductionRows {
     size: usize,
     consistent: bool,
     /// Longest runs of equal rows of each work item.
-    segments: Vec<Vec<Segment>>,
+    segments: Vec<Vec<RowRun>>,
     stencils: Stencils,
     /// Stencil of each row with its own values; empty without such rows.
-    own: Vec<Stencil>,
+    own: Vec<RowStencil>,
     /// Values without the contributions of each evaluation.
     base: Option<[Vec<f64>; 2]>,
     /// Version of the pattern, and of the values.
@@ -109,7 +109,7 @@ pub struct Diagonal {
 
 impl Diagonal {
     /// Returns the diagonal of `weights[0]`·M + `weights[1]`·K.
-    pub fn of(&mut self, rows: &Rows, weights: [f64; 2]) -> &[f64] {
+    pub fn update(&mut self, rows: &ConductionRows, weights: [f64; 2]) -> &[f64] {
         let made_for = Some((rows.versions, weights.map(f64::to_bits)));
         if self.made_for != made_for {
             self.values.clear();
@@ -122,21 +122,21 @@ impl Diagonal {
 }
 
 /// Largest mean length of runs that count as short.
-const MOST_ALONE: usize = 4;
+const MAX_SHORT_RUN: usize = 4;
 /// Marks a list that has no number yet.
-const UNNAMED: u32 = u32::MAX;
+const UNNUMBERED: u32 = u32::MAX;
 /// Reciprocal of the fraction of entries that may belong to unused stencils.
-const MOST_DEAD: usize = 4;
+const MIN_USED_RATIO: usize = 4;
 /// Smallest ratio of rows to distinct ones that count as few.
-const FEW: usize = 4;
+const MIN_REPEATED_ROWS: usize = 4;
 
 /// New rows of one work item: runs with locally numbered stencils, and true for rows with their own values.
-struct Part {
-    runs: Vec<(Segment, bool)>,
+struct NewRows {
+    runs: Vec<(RowRun, bool)>,
     stencils: Stencils,
 }
 
-impl Rows {
+impl ConductionRows {
     /// Returns an empty matrix.
     pub fn new(consistent: bool) -> Self {
         Self {
@@ -174,17 +174,17 @@ impl Rows {
     /// Returns true if most rows of a work item differ from their neighbours.
     pub fn is_unequal(&self, item: usize) -> bool {
         let rows = (self.size - item * CHUNK).min(CHUNK);
-        MOST_ALONE * self.segments[item].len() > rows
+        MAX_SHORT_RUN * self.segments[item].len() > rows
     }
 
     /// Returns true if distinct rows are few enough for caches, however they alternate.
     pub fn are_few(&self) -> bool {
-        FEW * self.stencils.values.used <= self.size
+        MIN_REPEATED_ROWS * self.stencils.values.used <= self.size
     }
 
     /// Builds `size` rows; `fill` begins each row and adds its entries.
     #[cfg(test)]
-    pub fn build(size: usize, consistent: bool, fill: impl Fn(usize, &mut Row) + Sync) -> Self {
+    pub fn build(size: usize, consistent: bool, fill: impl Fn(usize, &mut RowBuilder) + Sync) -> Self {
         let mut rows = Self::new(consistent);
         rows.update(size, &(0..size as u32).collect::<Vec<_>>(), fill);
         rows
@@ -193,22 +193,22 @@ impl Rows {
     /// Rebuilds the `changed` rows, ascending, and adds empty ones up to `size`; `fill` begins each row and
     /// adds its entries. Other rows stay. The result depends on the rows alone, not on their history, except
     /// for unused stencils.
-    pub fn update(&mut self, size: usize, changed: &[u32], fill: impl Fn(usize, &mut Row) + Sync) {
+    pub fn update(&mut self, size: usize, changed: &[u32], fill: impl Fn(usize, &mut RowBuilder) + Sync) {
         let Stencils { values, patterns, .. } = &self.stencils;
-        if values.dead + patterns.dead > (values.entries() / MOST_DEAD).max(self.size) {
+        if values.dead + patterns.dead > (values.entries() / MIN_USED_RATIO).max(self.size) {
             self.compact();
         }
         self.versions = self.versions.map(|version| version + 1);
         let groups: Vec<&[u32]> =
             changed.chunk_by(|a, b| *a as usize / CHUNK == *b as usize / CHUNK).collect();
-        let parts: Vec<Part> =
-            groups.par_iter().map(|changed| Part::new(changed, self.consistent, &fill)).collect();
+        let parts: Vec<NewRows> =
+            groups.par_iter().map(|changed| NewRows::new(changed, self.consistent, &fill)).collect();
         let before = self.size;
         self.size = size.max(before);
         self.segments.resize_with(items(self.size), Vec::new);
         self.changed.resize(self.segments.len(), self.versions);
         if !self.own.is_empty() || parts.iter().any(|part| part.runs.iter().any(|run| run.1)) {
-            self.own.resize(self.size, Stencil::NONE);
+            self.own.resize(self.size, RowStencil::NONE);
         }
         let mut of = Vec::with_capacity(CHUNK);
         let mut parts = groups.iter().map(|group| group[0] as usize / CHUNK).zip(parts).peekable();
@@ -221,26 +221,26 @@ impl Rows {
             }
             self.changed[item] = self.versions;
             of.clear();
-            of.resize(end - first, Stencil::NONE);
+            of.resize(end - first, RowStencil::NONE);
             for segment in &self.segments[item] {
                 of[segment.rows()].fill(segment.stencil);
-                self.stencils.patterns.release(segment.stencil.pattern, segment.length);
-                self.stencils.values.release(segment.stencil.values, segment.length);
+                self.stencils.patterns.remove_rows(segment.stencil.pattern, segment.length);
+                self.stencils.values.remove_rows(segment.stencil.values, segment.length);
             }
             if let Some(part) = part {
-                let mut patterns = vec![UNNAMED; part.stencils.patterns.count()];
-                let mut values = vec![UNNAMED; part.stencils.values.count()];
+                let mut patterns = vec![UNNUMBERED; part.stencils.patterns.count()];
+                let mut values = vec![UNNUMBERED; part.stencils.values.count()];
                 for (run, own) in &part.runs {
                     let entries = part.stencils.entries(run.stencil);
                     let pattern = &mut patterns[run.stencil.pattern as usize];
-                    if *pattern == UNNAMED {
+                    if *pattern == UNNUMBERED {
                         *pattern = self.stencils.pattern(entries.offsets);
                     }
                     let values = &mut values[run.stencil.values as usize];
-                    if *values == UNNAMED {
+                    if *values == UNNUMBERED {
                         *values = self.stencils.list(entries, *own);
                     }
-                    let stencil = Stencil { pattern: *pattern, values: *values };
+                    let stencil = RowStencil { pattern: *pattern, values: *values };
                     of[run.rows()].fill(stencil);
                     if let Some(place) = self.own.get_mut(first + usize::from(run.start))
                         && *own
@@ -250,18 +250,18 @@ impl Rows {
                 }
             }
             // rows out of use
-            if of.contains(&Stencil::NONE) {
+            if of.contains(&RowStencil::NONE) {
                 let none = Entries { offsets: &[], conduction: &[], capacity: &[] };
                 let empty = self.stencils.find_or_add(none, false);
                 of.iter_mut()
-                    .filter(|stencil| **stencil == Stencil::NONE)
+                    .filter(|stencil| **stencil == RowStencil::NONE)
                     .for_each(|stencil| *stencil = empty);
             }
             self.segments[item].clear();
             let mut start = 0;
             for run in of.chunk_by(|a, b| a == b) {
-                let segment = Segment { start, length: run.len() as u16, stencil: run[0] };
-                self.hold(segment);
+                let segment = RowRun { start, length: run.len() as u16, stencil: run[0] };
+                self.count_rows(segment);
                 self.segments[item].push(segment);
                 start += segment.length;
             }
@@ -269,30 +269,30 @@ impl Rows {
         }
     }
 
-    fn hold(&mut self, Segment { length, stencil, .. }: Segment) {
-        self.stencils.patterns.hold(stencil.pattern, length);
-        self.stencils.values.hold(stencil.values, length);
+    fn count_rows(&mut self, RowRun { length, stencil, .. }: RowRun) {
+        self.stencils.patterns.add_rows(stencil.pattern, length);
+        self.stencils.values.add_rows(stencil.values, length);
     }
 
     /// Drops unused lists.
     fn compact(&mut self) {
         let old = std::mem::take(&mut self.stencils);
         let base = self.base.take();
-        let mut patterns = vec![UNNAMED; old.patterns.count()];
-        let mut values = vec![UNNAMED; old.values.count()];
+        let mut patterns = vec![UNNUMBERED; old.patterns.count()];
+        let mut values = vec![UNNUMBERED; old.values.count()];
         let mut kept = base.as_ref().map(|_| [Vec::new(), Vec::new()]);
         for item in 0..self.segments.len() {
             for at in 0..self.segments[item].len() {
-                let Segment { start, stencil, .. } = self.segments[item][at];
+                let RowRun { start, stencil, .. } = self.segments[item][at];
                 let own = self.own.get_mut(item * CHUNK + usize::from(start));
-                let own = own.filter(|own| **own != Stencil::NONE);
+                let own = own.filter(|own| **own != RowStencil::NONE);
                 let entries = old.entries(stencil);
                 let pattern = &mut patterns[stencil.pattern as usize];
-                if *pattern == UNNAMED {
+                if *pattern == UNNUMBERED {
                     *pattern = self.stencils.pattern(entries.offsets);
                 }
                 let values = &mut values[stencil.values as usize];
-                if *values == UNNAMED {
+                if *values == UNNUMBERED {
                     *values = self.stencils.list(entries, own.is_some());
                     for (kept, base) in kept.iter_mut().flatten().zip(base.iter().flatten()) {
                         kept.extend_from_slice(
@@ -300,17 +300,16 @@ impl Rows {
                         );
                     }
                 }
-                let stencil = Stencil { pattern: *pattern, values: *values };
+                let stencil = RowStencil { pattern: *pattern, values: *values };
                 own.into_iter().for_each(|own| *own = stencil);
                 self.segments[item][at].stencil = stencil;
-                self.hold(self.segments[item][at]);
+                self.count_rows(self.segments[item][at]);
             }
         }
         self.base = kept;
     }
 
-    /// Number of lists of values, of segments of equal rows, and of entries of K in these lists; independent
-    /// of the history.
+    /// Number of lists of values, of runs of equal rows, and of entries of K; independent of the history.
     pub fn stored(&self) -> [usize; 3] {
         let Stencils { values, .. } = &self.stencils;
         [values.used, self.segments.iter().map(Vec::len).sum(), values.entries() - values.dead]
@@ -318,13 +317,13 @@ impl Rows {
 
     /// Bytes of memory.
     pub fn bytes(&self) -> usize {
-        let segments: usize = self.segments.iter().map(Vec::len).sum();
-        segments * size_of::<Segment>() + self.own.len() * size_of::<Stencil>() + self.stencils.bytes()
+        let runs: usize = self.segments.iter().map(Vec::len).sum();
+        runs * size_of::<RowRun>() + self.own.len() * size_of::<RowStencil>() + self.stencils.bytes()
     }
 
     /// Adds to an entry of a row with its own values; without effect on other rows.
     pub fn add(&mut self, row: usize, column: usize, conduction: f64, capacity: f64) {
-        let Some(&Stencil { pattern, values }) = self.own.get(row).filter(|own| **own != Stencil::NONE)
+        let Some(&RowStencil { pattern, values }) = self.own.get(row).filter(|own| **own != RowStencil::NONE)
         else {
             return;
         };
@@ -372,7 +371,7 @@ impl Rows {
 
     /// Returns the largest of `of(row, K_ii)`.
     pub fn largest(&self, of: impl Fn(usize, f64) -> f64 + Sync) -> f64 {
-        let item = |(item, segments): (usize, &Vec<Segment>)| {
+        let item = |(item, segments): (usize, &Vec<RowRun>)| {
             let mut most = f64::NEG_INFINITY;
             for segment in segments {
                 let value = self.diagonal(segment, [0.0, 1.0]);
@@ -383,7 +382,7 @@ impl Rows {
         self.segments.par_iter().enumerate().map(item).reduce(|| f64::NEG_INFINITY, f64::max)
     }
 
-    fn diagonal(&self, segment: &Segment, weights: [f64; 2]) -> f64 {
+    fn diagonal(&self, segment: &RowRun, weights: [f64; 2]) -> f64 {
         self.stencils.diagonal(segment.stencil).map_or(0.0, |at| self.value(at, weights))
     }
 
@@ -403,7 +402,7 @@ impl Rows {
     }
 
     /// Run of a row.
-    fn segment(&self, row: usize) -> Option<&Segment> {
+    fn segment(&self, row: usize) -> Option<&RowRun> {
         let segments = self.segments.get(row / CHUNK)?;
         let next = segments.partition_point(|segment| usize::from(segment.start) <= row % CHUNK);
         segments.get(next.saturating_sub(1))
@@ -434,7 +433,7 @@ impl Rows {
         flow.par_chunks_mut(CHUNK).zip(stored.par_chunks_mut(CHUNK)).enumerate().for_each(
             |(item, (flow, stored))| {
                 let (segments, first) = (&self.segments[item], item * CHUNK);
-                Arch::new().dispatch(Both { rows: self, segments, x, u, flow, stored, first });
+                Arch::new().dispatch(FlowAndCapacity { rows: self, segments, x, u, flow, stored, first });
             },
         );
     }
@@ -446,12 +445,12 @@ impl Rows {
         x: &[f64],
         y: &mut [f64],
     ) -> f64 {
-        let part = |(item, y): (usize, &mut [f64])| self.part::<FLOW>(item, diagonal, weights, x, y);
+        let part = |(item, y): (usize, &mut [f64])| self.multiply_item::<FLOW>(item, diagonal, weights, x, y);
         ordered_sum(y.par_chunks_mut(CHUNK).enumerate().map(part))
     }
 
     /// Multiplies the rows of one work item, by [`Self::product`] or as a flow.
-    pub fn part<const FLOW: bool>(
+    pub fn multiply_item<const FLOW: bool>(
         &self,
         item: usize,
         diagonal: Option<&[f64]>,
@@ -460,11 +459,11 @@ impl Rows {
         y: &mut [f64],
     ) -> f64 {
         let (segments, first) = (&self.segments[item], item * CHUNK);
-        Arch::new().dispatch(Product::<FLOW> { rows: self, segments, weights, diagonal, x, y, first })
+        Arch::new().dispatch(RowsProduct::<FLOW> { rows: self, segments, weights, diagonal, x, y, first })
     }
 }
 
-impl Segment {
+impl RowRun {
     /// Rows, within the work item.
     #[inline(always)]
     fn rows(self) -> std::ops::Range<usize> {
@@ -473,11 +472,11 @@ impl Segment {
     }
 }
 
-impl Part {
+impl NewRows {
     /// Builds the rows of one work item, ascending.
-    fn new(changed: &[u32], consistent: bool, fill: &(impl Fn(usize, &mut Row) + Sync)) -> Self {
+    fn new(changed: &[u32], consistent: bool, fill: &(impl Fn(usize, &mut RowBuilder) + Sync)) -> Self {
         let mut part = Self { runs: Vec::new(), stencils: Stencils::default() };
-        let mut row = Row::default();
+        let mut row = RowBuilder::default();
         for &index in changed {
             fill(index as usize, &mut row);
             let start = (index as usize % CHUNK) as u16;
@@ -490,7 +489,7 @@ impl Part {
                 Some((last, false)) if last.stencil == stencil && last.start + last.length == start => {
                     last.length += 1;
                 }
-                _ => part.runs.push((Segment { start, length: 1, stencil }, own)),
+                _ => part.runs.push((RowRun { start, length: 1, stencil }, own)),
             }
         }
         part

@@ -102,12 +102,12 @@ impl FaceMatrix<'_> {
 
 /// A face with its quadrature.
 #[derive(Clone, Debug)]
-struct Acting<const N: usize, const P: usize> {
+struct QuadratureFace<const N: usize, const P: usize> {
     equations: [u32; N],
     geometry: FaceGeometry<N, P>,
 }
 
-impl<const N: usize, const P: usize> Acting<N, P> {
+impl<const N: usize, const P: usize> QuadratureFace<N, P> {
     fn new(problem: &Problem, face: Face, equation: &[u32]) -> Self {
         let nodes = problem.mesh.face_nodes(face);
         let (mut corners, mut equations) = ([[0.0; 3]; N], [0; N]);
@@ -124,7 +124,7 @@ type Pairs = Vec<(u32, u32, f64)>;
 
 /// A condition on existing faces.
 #[derive(Clone, Debug, Default)]
-struct Part {
+struct ConditionFaces {
     condition: usize,
     radiates: bool,
     /// Equations with ∮ N dA, m², ascending.
@@ -133,15 +133,15 @@ struct Part {
     /// faces, whose ∮ N dA is negative at corners.
     pairs: Pairs,
     /// Faces, for film and radiation with consistent capacity.
-    faces: Vec<Acting<4, 4>>,
+    faces: Vec<QuadratureFace<4, 4>>,
     /// Second-order faces, likewise.
-    wide: Vec<Acting<8, 9>>,
+    wide: Vec<QuadratureFace<8, 9>>,
 }
 
 /// Conditions on the current outer surface, and sources in existing elements.
 #[derive(Clone, Debug, Default)]
 pub struct Surfaces {
-    parts: Vec<Part>,
+    parts: Vec<ConditionFaces>,
     /// Source index, and equations with ∫ N dV, m³, ascending.
     sources: Vec<(usize, Vec<(u32, f64)>)>,
     /// Source index, and pairs of equations with ∫ N N dV, m³, of second-order elements.
@@ -175,13 +175,13 @@ fn gather_pairs(mut list: Pairs) -> Pairs {
 }
 
 /// Set of equations that have gained elements.
-pub struct Touched {
+pub struct TouchedEquations {
     /// Equations, without duplicates, ascending after [`Self::sort`].
     pub list: Vec<u32>,
     marks: Vec<bool>,
 }
 
-impl Touched {
+impl TouchedEquations {
     /// Returns an empty set for `size` equations.
     pub fn new(size: usize) -> Self {
         Self { list: Vec::new(), marks: vec![false; size] }
@@ -225,7 +225,7 @@ impl Surfaces {
         let surfaces = (0..problem.conditions.len()).filter(|&k| problem.conditions[k].surface().is_some());
         let part = |condition: usize| {
             let radiates = matches!(problem.conditions[condition], Condition::Radiation { .. });
-            Part { condition, radiates, ..Part::default() }
+            ConditionFaces { condition, radiates, ..ConditionFaces::default() }
         };
         let sources = (0..problem.sources.len()).map(|source| (source, Vec::new())).collect();
         Self { parts: surfaces.map(part).collect(), sources, wide_sources: Vec::new() }
@@ -233,13 +233,13 @@ impl Surfaces {
 
     /// Updates conditions at touched equations, on those exposed `faces` there on which one `acts`. With
     /// consistent capacity all equations are touched.
-    pub fn act(
+    pub fn set_condition(
         &mut self,
         problem: &Problem,
         faces: &[Face],
         equation: &[u32],
         consistent: bool,
-        touched: &Touched,
+        touched: &TouchedEquations,
         acts: impl Fn(usize, Face) -> bool,
     ) {
         for part in &mut self.parts {
@@ -251,12 +251,12 @@ impl Surfaces {
             for &face in faces.iter().filter(|&&face| acts(part.condition, face)) {
                 let nodes = problem.mesh.face_nodes(face).len();
                 if nodes > 4 {
-                    let acting = Acting::<8, 9>::new(problem, face, equation);
+                    let acting = QuadratureFace::<8, 9>::new(problem, face, equation);
                     if !by_nodes {
                         part.wide.push(acting);
                         continue;
                     }
-                    let Acting { equations, geometry } = acting;
+                    let QuadratureFace { equations, geometry } = acting;
                     for (a, b) in (0..nodes).flat_map(|a| (0..nodes).map(move |b| (a, b))) {
                         let of =
                             |g: usize| geometry.weights[g] * geometry.shapes[g][a] * geometry.shapes[g][b];
@@ -264,9 +264,9 @@ impl Surfaces {
                     }
                     continue;
                 }
-                let acting = Acting::<4, 4>::new(problem, face, equation);
+                let acting = QuadratureFace::<4, 4>::new(problem, face, equation);
                 if by_nodes {
-                    let Acting { equations, geometry } = acting;
+                    let QuadratureFace { equations, geometry } = acting;
                     let areas = (0..nodes).map(|k| (equations[k], geometry.corner_areas[k]));
                     list.extend(areas.filter(|entry| touched.contains(entry.0)));
                 } else {
@@ -280,7 +280,13 @@ impl Surfaces {
 
     /// Updates a source at touched equations, from ∫ N dV at the nodes of its first-order elements, and ∫ N N
     /// dV of second-order ones, which are never born later.
-    pub fn release(&mut self, source: usize, volumes: Vec<(u32, f64)>, pairs: Pairs, touched: &Touched) {
+    pub fn set_source(
+        &mut self,
+        source: usize,
+        volumes: Vec<(u32, f64)>,
+        pairs: Pairs,
+        touched: &TouchedEquations,
+    ) {
         touched.replace(&mut self.sources[source].1, volumes);
         if !pairs.is_empty() {
             self.wide_sources.push((source, gather_pairs(pairs)));
@@ -289,14 +295,17 @@ impl Surfaces {
 
     /// Returns true if a condition radiates.
     pub fn radiates(&self) -> bool {
-        let acts = |part: &Part| !(part.nodes.is_empty() && part.faces.is_empty() && part.wide.is_empty());
+        let acts =
+            |part: &ConditionFaces| !(part.nodes.is_empty() && part.faces.is_empty() && part.wide.is_empty());
         self.parts.iter().any(|part| part.radiates && acts(part))
     }
 
     /// Returns true if a film coefficient differs between two times, and with it the matrix.
     pub fn varies(&self, problem: &Problem, between: [f64; 2]) -> bool {
         self.parts.iter().any(|part| match &problem.conditions[part.condition] {
-            Condition::Film { coefficient, .. } => coefficient.at(between[0]) != coefficient.at(between[1]),
+            Condition::Film { coefficient, .. } => {
+                coefficient.value_at(between[0]) != coefficient.value_at(between[1])
+            }
             _ => false,
         })
     }
@@ -311,25 +320,25 @@ impl Surfaces {
                 Condition::Temperature { .. } => {}
                 Condition::Flux { inward, .. } => {
                     for &(equation, area) in &part.nodes {
-                        let heat = area * inward.at(place(equation), at.time);
+                        let heat = area * inward.value_at(place(equation), at.time);
                         out.rate[equation as usize] -= heat;
                         exchange.flux += heat;
                     }
                     for &(equation, at_equation, area) in &part.pairs {
-                        let heat = area * inward.at(place(at_equation), at.time);
+                        let heat = area * inward.value_at(place(at_equation), at.time);
                         out.rate[equation as usize] -= heat;
                         exchange.flux += heat;
                     }
                 }
                 Condition::Film { coefficient, ambient, .. } => {
-                    let (film, ambient) = (coefficient.at(at.time), ambient.at(at.time));
-                    exchange.film -= part.lose(at, out, |t| (film * (t - ambient), film));
+                    let (film, ambient) = (coefficient.value_at(at.time), ambient.value_at(at.time));
+                    exchange.film -= part.add_loss(at, out, |t| (film * (t - ambient), film));
                 }
                 Condition::Radiation { emissivity, ambient, .. } => {
-                    let ambient = ambient.at(at.time);
+                    let ambient = ambient.value_at(at.time);
                     let (factor, fourth) = (emissivity * STEFAN_BOLTZMANN, ambient.powi(4));
                     // odd continuation below 0 K, which iterates may reach
-                    exchange.radiation -= part.lose(at, out, |t| {
+                    exchange.radiation -= part.add_loss(at, out, |t| {
                         let cube = t.abs() * t * t;
                         (factor * (cube * t - fourth), 4.0 * factor * cube)
                     });
@@ -339,7 +348,7 @@ impl Surfaces {
         for (source, volumes) in &self.sources {
             let power = &problem.sources[*source].power;
             for &(equation, volume) in volumes {
-                let heat = volume * power.at(place(equation), at.time);
+                let heat = volume * power.value_at(place(equation), at.time);
                 out.rate[equation as usize] -= heat;
                 exchange.source += heat;
             }
@@ -347,7 +356,7 @@ impl Surfaces {
         for (source, pairs) in &self.wide_sources {
             let power = &problem.sources[*source].power;
             for &(equation, at_equation, volume) in pairs {
-                let heat = volume * power.at(place(at_equation), at.time);
+                let heat = volume * power.value_at(place(at_equation), at.time);
                 out.rate[equation as usize] -= heat;
                 exchange.source += heat;
             }
@@ -356,9 +365,9 @@ impl Surfaces {
     }
 }
 
-impl Part {
+impl ConditionFaces {
     /// Adds a heat loss (q, ∂q/∂T) that depends on temperature; returns its sum, W.
-    fn lose(&self, at: &StepInput, out: &mut Evaluation, loss: impl Fn(f64) -> (f64, f64)) -> f64 {
+    fn add_loss(&self, at: &StepInput, out: &mut Evaluation, loss: impl Fn(f64) -> (f64, f64)) -> f64 {
         let mut total = 0.0;
         for &(equation, area) in &self.nodes {
             let (q, slope) = loss(at.temperature[equation as usize]);
@@ -366,14 +375,14 @@ impl Part {
             out.conductance.push((equation, area * slope));
             total += area * q;
         }
-        total = self.faces.iter().fold(total, |total, face| face.lose(at, out, &loss, total));
-        self.wide.iter().fold(total, |total, face| face.lose(at, out, &loss, total))
+        total = self.faces.iter().fold(total, |total, face| face.add_loss(at, out, &loss, total));
+        self.wide.iter().fold(total, |total, face| face.add_loss(at, out, &loss, total))
     }
 }
 
-impl<const N: usize, const P: usize> Acting<N, P> {
+impl<const N: usize, const P: usize> QuadratureFace<N, P> {
     /// Adds to `rate` and `faces`, and the heat loss, W, to `total`.
-    fn lose(
+    fn add_loss(
         &self,
         at: &StepInput,
         out: &mut Evaluation,

@@ -149,7 +149,7 @@ pub fn combine<T: Copy + Send>(out: &mut [T], value: impl Fn(usize, T) -> T + Sy
     });
 }
 
-struct Advance<'a> {
+struct SolutionUpdate<'a> {
     length: f64,
     solution: &'a mut [f64],
     residual: &'a mut [f64],
@@ -158,7 +158,7 @@ struct Advance<'a> {
     inverse: &'a [f64],
 }
 
-impl WithSimd for Advance<'_> {
+impl WithSimd for SolutionUpdate<'_> {
     type Output = f64;
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> f64 {
@@ -204,18 +204,18 @@ pub fn advance(
         .zip(direction.par_chunks(CHUNK).zip(image.par_chunks(CHUNK)))
         .zip(inverse.par_chunks(CHUNK));
     ordered_sum(items.map(|(((solution, residual), (direction, image)), inverse)| {
-        arch.dispatch(Advance { length, solution, residual, direction, image, inverse })
+        arch.dispatch(SolutionUpdate { length, solution, residual, direction, image, inverse })
     }))
 }
 
-struct Turn<'a> {
+struct DirectionUpdate<'a> {
     factor: f64,
     direction: &'a mut [f64],
     residual: &'a [f64],
     inverse: &'a [f64],
 }
 
-impl WithSimd for Turn<'_> {
+impl WithSimd for DirectionUpdate<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
@@ -240,7 +240,7 @@ pub fn turn(factor: f64, direction: &mut [f64], residual: &[f64], inverse: &[f64
     let arch = Arch::new();
     direction.par_chunks_mut(CHUNK).zip(residual.par_chunks(CHUNK).zip(inverse.par_chunks(CHUNK))).for_each(
         |(direction, (residual, inverse))| {
-            arch.dispatch(Turn { factor, direction, residual, inverse });
+            arch.dispatch(DirectionUpdate { factor, direction, residual, inverse });
         },
     );
 }

@@ -2,10 +2,10 @@
 
 use crate::solver::{Cached, Operator};
 use crate::system::vector::{blend, combine, dot, set};
-use crate::system::{Diagonal, Evaluation, FaceMatrices, System};
+use crate::system::{Diagonal, Evaluation, FaceMatrices, ThermalSystem};
 
 /// Cache key of values that depend on the matrix.
-pub fn key(system: &System, weight: f64) -> (u64, u64) {
+pub fn key(system: &ThermalSystem, weight: f64) -> (u64, u64) {
     (system.generation, weight.to_bits())
 }
 
@@ -38,12 +38,12 @@ impl Matrix {
     }
 
     /// Computes everything from the tangents of an evaluation.
-    pub fn compute(&mut self, system: &System, evaluation: &Evaluation, weight: f64) {
+    pub fn compute(&mut self, system: &ThermalSystem, evaluation: &Evaluation, weight: f64) {
         let size = system.size();
         let Evaluation { conductance, faces, .. } = evaluation;
         let capacity = evaluation.capacity(system);
         let sums_for = (system.build, system.rows.versions()[1]);
-        if !self.free_sums.is_for(sums_for) {
+        if !self.free_sums.matches(sums_for) {
             let mut sums = [Vec::new(), Vec::new()];
             // rows of K sum to zero except at prescribed neighbours
             if system.consistent || !system.fixed.is_empty() {
@@ -55,7 +55,7 @@ impl Matrix {
                 system.rows.product(None, [1.0, 0.0], &system.free, &mut sums[1]);
             }
             self.free_sums.value = sums;
-            self.free_sums.made_for(sums_for);
+            self.free_sums.set_key(sums_for);
         }
         // A's diagonal, until it is inverted
         self.inverse.resize(size, 0.0);
@@ -76,7 +76,7 @@ impl Matrix {
             // also for rows that change in every evaluation
             system.rows.add_diagonal(weights, whole);
         } else {
-            let own = self.rows.of(&system.rows, weights);
+            let own = self.rows.update(&system.rows, weights);
             combine(whole, |k, whole| whole + own[k]);
         }
         if system.consistent {
@@ -99,7 +99,7 @@ impl Matrix {
     }
 
     /// Sums A x over the free nodes, for x that is 0 at all others.
-    pub fn column_sums(&self, system: &System, weight: f64, x: &[f64]) -> f64 {
+    pub fn column_sums(&self, system: &ThermalSystem, weight: f64, x: &[f64]) -> f64 {
         if system.consistent {
             return dot(&self.row_sums, x);
         }
@@ -110,7 +110,7 @@ impl Matrix {
     /// Returns A, without packed rows.
     pub fn operator<'a>(
         &'a self,
-        system: &'a System,
+        system: &'a ThermalSystem,
         weight: f64,
         evaluation: &'a Evaluation,
     ) -> Operator<'a> {

@@ -16,8 +16,8 @@ mod matrix;
 mod stage;
 mod step;
 
-pub(crate) use stage::{Stage, Stages};
-pub(crate) use step::{Attempt, Start, Stepper};
+pub(crate) use stage::{StageEquation, Stages};
+pub(crate) use step::{Attempt, StepStart, Stepper};
 
 /// Time integrators.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]

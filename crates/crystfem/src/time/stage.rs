@@ -3,28 +3,29 @@
 use super::Work;
 use super::matrix::{Matrix, key};
 use crate::error::Error;
-use crate::ledger::NOTHING;
+use crate::ledger::REFERENCE_SHIFT;
 use crate::problem::Problem;
 use crate::solver::{
-    Cached, Direct, Ended, Goal, Iterative, Method, Multigrid, Operator, Packed, norm_squared,
+    Cached, Direct, Iterative, LinearMethod, Multigrid, Operator, PackedRows, SolveOutcome,
+    StoppingCriterion, norm_squared,
 };
 use crate::system::vector::{combine, dot, largest, set, sum};
-use crate::system::{Evaluation, Memory, StepInput, System};
+use crate::system::{Evaluation, PointMemory, StepInput, ThermalSystem};
 
 /// Limit on Newton iterations.
-const MOST_ITERATIONS: usize = 60;
+const MAX_ITERATIONS: usize = 60;
 /// Limit on halvings of a Newton step.
-const MOST_HALVINGS: usize = 7;
+const MAX_HALVINGS: usize = 7;
 /// Limit on consecutive full Newton steps at a jump of k while the residual does not fall.
-const MOST_FULL_STEPS: usize = 8;
+const MAX_FULL_STEPS: usize = 8;
 /// Limit on balance corrections of a linear stage.
-const MOST_SHIFTS: usize = 3;
+const MAX_SHIFTS: usize = 3;
 /// Largest sum of all residuals over the heat moved; the energy audit promises 1e-10.
-const BALANCED: f64 = 2e-11;
+const BALANCE_TOLERANCE: f64 = 2e-11;
 
 /// Equation of a stage.
 #[derive(Clone, Copy)]
-pub struct Stage<'a> {
+pub struct StageEquation<'a> {
     /// Factor of Q, s.
     pub weight: f64,
     /// Length of the increment, s.
@@ -36,7 +37,7 @@ pub struct Stage<'a> {
     /// Temperatures at the start, K.
     pub start: &'a [f64],
     /// Points at the start.
-    pub old: &'a Memory,
+    pub old: &'a PointMemory,
     /// Requests a stop.
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }
@@ -50,12 +51,12 @@ pub struct Stages {
     /// vector by corrections.
     pub residual: Vec<f64>,
     /// Requested method; factors and levels are made when first needed.
-    pub method: Method,
+    pub method: LinearMethod,
     matrix: Cached<Matrix>,
     /// Factors of the matrix, with their analysis for the present build.
     factors: Cached<Option<Direct>>,
     iterative: Iterative,
-    packed: Packed,
+    packed: PackedRows,
     /// Right-hand side of a filter.
     right: Vec<f64>,
     correction: Vec<f64>,
@@ -76,11 +77,11 @@ impl Stages {
     }
 
     /// Computes the matrix of the last evaluation, unless a linear system has it already.
-    fn prepare(&mut self, system: &System, weight: f64) {
+    fn prepare(&mut self, system: &ThermalSystem, weight: f64) {
         let key = key(system, weight);
-        if !(self.matrix.is_for(key) && system.is_linear()) {
+        if !(self.matrix.matches(key) && system.is_linear()) {
             self.matrix.value.compute(system, &self.evaluation, weight);
-            self.matrix.made_for(key);
+            self.matrix.set_key(key);
         }
     }
 
@@ -92,8 +93,8 @@ impl Stages {
     pub fn solve(
         &mut self,
         problem: &Problem,
-        system: &mut System,
-        stage: &Stage,
+        system: &mut ThermalSystem,
+        stage: &StageEquation,
         temperature: &mut Vec<f64>,
         tolerance: f64,
         work: &mut Work,
@@ -108,7 +109,7 @@ impl Stages {
             }
             self.evaluate(problem, system, stage, temperature, work)?;
             // for very long steps the residual of the linear solve and the true one differ by rounding
-            for _ in 0..MOST_SHIFTS {
+            for _ in 0..MAX_SHIFTS {
                 if self.balanced(system, stage.weight) {
                     break;
                 }
@@ -122,7 +123,7 @@ impl Stages {
         }
         let mut error = f64::INFINITY;
         let mut best = (f64::INFINITY, 0);
-        for iteration in 0..MOST_ITERATIONS {
+        for iteration in 0..MAX_ITERATIONS {
             self.prepare(system, stage.weight);
             let square = norm_squared(&self.residual, &self.matrix.value.inverse);
             error = (square / self.matrix.value.capacity).sqrt();
@@ -144,18 +145,18 @@ impl Stages {
             if square < best.0 {
                 best = (square, iteration);
             }
-            let whole = !system.is_symmetric() && iteration - best.1 < MOST_FULL_STEPS;
-            for halving in 0..=MOST_HALVINGS {
+            let whole = !system.is_symmetric() && iteration - best.1 < MAX_FULL_STEPS;
+            for halving in 0..=MAX_HALVINGS {
                 let correction = &self.correction;
                 set(&mut trial, |k| temperature[k] + part * correction[k]);
                 let evaluated = self.evaluate(problem, system, stage, &trial, work);
                 let reached = norm_squared(&self.residual, &inverse);
                 let better = reached <= (1.0 - 0.1 * part) * square || reached <= self.matrix.value.floor;
                 let better = better || (whole && reached.is_finite());
-                if evaluated.is_ok() && (better || (halving == MOST_HALVINGS && reached.is_finite())) {
+                if evaluated.is_ok() && (better || (halving == MAX_HALVINGS && reached.is_finite())) {
                     break;
                 }
-                if halving == MOST_HALVINGS {
+                if halving == MAX_HALVINGS {
                     evaluated?;
                     return Err(not_finite(problem, system, stage, &trial));
                 }
@@ -168,7 +169,7 @@ impl Stages {
         Err(Error::NotConverged {
             method: "Newton's iteration",
             time: stage.time,
-            iterations: MOST_ITERATIONS,
+            iterations: MAX_ITERATIONS,
             error,
             wanted: tolerance,
         })
@@ -179,20 +180,20 @@ impl Stages {
     pub fn filter(
         &mut self,
         problem: &Problem,
-        system: &System,
+        system: &ThermalSystem,
         weight: f64,
         right: impl Fn(usize) -> f64 + Sync,
         tolerance: f64,
         work: &mut Work,
     ) -> f64 {
         self.prepare(system, weight);
-        self.raise(problem, system, weight, work);
+        self.build_levels(problem, system, weight, work);
         let size = system.size();
         self.right.resize(size, 0.0);
         set(&mut self.right, |k| system.free[k] * right(k));
         let packed = pack(&mut self.packed, system, weight);
         let operator = Operator { packed, ..self.matrix.value.operator(system, weight, &self.evaluation) };
-        let goal = Goal {
+        let goal = StoppingCriterion {
             capacity: self.matrix.value.capacity,
             tolerance,
             floor: 0.0,
@@ -200,9 +201,9 @@ impl Stages {
             stop: &|| false,
         };
         self.correction.resize(size, 0.0);
-        let factored = self.factors.is_for(key(system, weight)) && system.is_linear();
+        let factored = self.factors.matches(key(system, weight)) && system.is_linear();
         match &mut self.factors.value {
-            Some(factors) if self.method == Method::Factors && factored => {
+            Some(factors) if self.method == LinearMethod::Factors && factored => {
                 factors.solve(&self.right, &mut self.correction);
                 work.direct_solves += 1;
             }
@@ -221,8 +222,8 @@ impl Stages {
     fn evaluate(
         &mut self,
         problem: &Problem,
-        system: &mut System,
-        stage: &Stage,
+        system: &mut ThermalSystem,
+        stage: &StageEquation,
         temperature: &[f64],
         work: &mut Work,
     ) -> Result<(), Error> {
@@ -242,13 +243,13 @@ impl Stages {
     }
 
     /// Builds requested multigrid levels for the prepared matrix.
-    fn raise(&mut self, problem: &Problem, system: &System, weight: f64, work: &mut Work) {
-        if self.method != Method::Multigrid || !system.is_symmetric() {
+    fn build_levels(&mut self, problem: &Problem, system: &ThermalSystem, weight: f64, work: &mut Work) {
+        if self.method != LinearMethod::Multigrid || !system.is_symmetric() {
             self.iterative.multigrid.value = None;
             return;
         }
         let levels = &mut self.iterative.multigrid;
-        if !levels.is_for_build(system.build) || levels.value.is_none() {
+        if !levels.matches_build(system.build) || levels.value.is_none() {
             let operator = self.matrix.value.operator(system, weight, &self.evaluation);
             let place = |k: usize| problem.mesh.points[system.nodes()[k] as usize];
             levels.value = Some(Multigrid::new(&operator, &system.free, place));
@@ -256,7 +257,7 @@ impl Stages {
             work.levels += 1;
         }
         let key = key(system, weight);
-        let set = levels.is_for(key) && system.is_linear();
+        let set = levels.matches(key) && system.is_linear();
         if let Some(multigrid) = levels.value.as_mut().filter(|_| !set) {
             if system.consistent {
                 let mut lumped = self.evaluation.capacity(system).to_vec();
@@ -266,7 +267,7 @@ impl Stages {
             } else {
                 multigrid.set(&self.matrix.value.diagonal, weight);
             }
-            levels.made_for(key);
+            levels.set_key(key);
         }
     }
 
@@ -275,39 +276,39 @@ impl Stages {
     fn correct(
         &mut self,
         problem: &Problem,
-        system: &System,
-        stage: &Stage,
+        system: &ThermalSystem,
+        stage: &StageEquation,
         tolerance: f64,
         work: &mut Work,
     ) -> Result<(), Error> {
         let size = system.size();
         // both are work vectors here, and evaluated again after the correction
         self.iterative.swap_vectors(&mut self.evaluation.change, &mut self.evaluation.rate);
-        self.raise(problem, system, stage.weight, work);
+        self.build_levels(problem, system, stage.weight, work);
         self.correction.resize(size, 0.0);
         combine(&mut self.residual, |k, residual| -system.free[k] * residual);
         let operator = self.matrix.value.operator(system, stage.weight, &self.evaluation);
-        let goal = Goal {
+        let goal = StoppingCriterion {
             capacity: self.matrix.value.capacity,
             tolerance,
             floor: self.matrix.value.floor,
             limit: limit(size),
             stop: stage.stop,
         };
-        let factored = self.method == Method::Factors && system.is_symmetric() && {
+        let factored = self.method == LinearMethod::Factors && system.is_symmetric() && {
             let key = key(system, stage.weight);
-            if !self.factors.is_for_build(system.build) {
+            if !self.factors.matches_build(system.build) {
                 let place = |e: u32| problem.mesh.points[system.nodes()[e as usize] as usize];
                 self.factors.value = Direct::analyse(&operator, &system.free, place);
                 self.factors.forget();
             }
             // without memory for factors, or with a matrix singular to rounding, the other method takes over
-            if !(self.factors.is_for(key) && system.is_linear()) {
+            if !(self.factors.matches(key) && system.is_linear()) {
                 work.factorizations += 1;
                 if !self.factors.value.as_mut().is_some_and(|factors| factors.factor(&operator)) {
                     self.factors.value = None;
                 }
-                self.factors.made_for(key);
+                self.factors.set_key(key);
             }
             self.factors.value.is_some()
         };
@@ -325,7 +326,7 @@ impl Stages {
         // 1·(r + A δ) from column sums, as the iterations know A to single precision only
         let mut total = 0.0;
         let ended = if factored {
-            Ended { iterations: 0, error: 0.0, converged: true }
+            SolveOutcome { iterations: 0, error: 0.0, converged: true }
         } else {
             work.cg_solves += 1;
             let packed = pack(&mut self.packed, system, stage.weight);
@@ -364,18 +365,24 @@ impl Stages {
         Ok(())
     }
 
-    /// Returns true if the residuals of the free nodes sum to zero, within [`BALANCED`].
-    fn balanced(&self, system: &System, weight: f64) -> bool {
+    /// Returns true if the residuals of the free nodes sum to zero, within [`BALANCE_TOLERANCE`].
+    fn balanced(&self, system: &ThermalSystem, weight: f64) -> bool {
         let size = system.size();
         let total = dot(&system.free, &self.residual);
         let mut gross = sum(size, |k| self.evaluation.change[k].abs());
         gross += weight * self.evaluation.exchange.gross();
         gross +=
             system.fixed.iter().map(|&(equation, _)| self.residual[equation as usize].abs()).sum::<f64>();
-        total.abs() <= BALANCED * (gross + NOTHING * self.sensitivity())
+        total.abs() <= BALANCE_TOLERANCE * (gross + REFERENCE_SHIFT * self.sensitivity())
     }
 
-    fn finite(&self, problem: &Problem, system: &System, stage: &Stage, found: &[f64]) -> Result<(), Error> {
+    fn finite(
+        &self,
+        problem: &Problem,
+        system: &ThermalSystem,
+        stage: &StageEquation,
+        found: &[f64],
+    ) -> Result<(), Error> {
         if sum(found.len(), |k| found[k]).is_finite() && sum(found.len(), |k| self.residual[k]).is_finite() {
             return Ok(());
         }
@@ -388,12 +395,12 @@ fn limit(size: usize) -> usize {
 }
 
 /// Packs the rows of a symmetric matrix; `None` if none are packed.
-fn pack<'a>(packed: &'a mut Packed, system: &System, weight: f64) -> Option<&'a Packed> {
+fn pack<'a>(packed: &'a mut PackedRows, system: &ThermalSystem, weight: f64) -> Option<&'a PackedRows> {
     let weights = if system.consistent { [1.0, weight] } else { [0.0, 1.0] };
     (system.is_symmetric() && packed.update(&system.rows, weights)).then_some(packed)
 }
 
-fn not_finite(problem: &Problem, system: &System, stage: &Stage, found: &[f64]) -> Error {
+fn not_finite(problem: &Problem, system: &ThermalSystem, stage: &StageEquation, found: &[f64]) -> Error {
     let place = match found.iter().position(|t| !t.is_finite()) {
         Some(k) => {
             let node = system.nodes()[k];

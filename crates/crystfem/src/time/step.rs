@@ -1,10 +1,10 @@
 //! Attempted steps of the schemes.
 
-use super::{Scheme, Stage, Stages, Work};
+use super::{Scheme, StageEquation, Stages, Work};
 use crate::error::Error;
 use crate::problem::Problem;
 use crate::system::vector::set;
-use crate::system::{Evaluation, Exchange, Memory, StepInput, System};
+use crate::system::{Evaluation, Exchange, PointMemory, StepInput, ThermalSystem};
 
 /// γ of TR-BDF2, 2 − √2.
 const GAMMA: f64 = 2.0 - std::f64::consts::SQRT_2;
@@ -15,7 +15,7 @@ const D: f64 = 0.5 * GAMMA;
 
 /// State at the start of a step.
 #[derive(Clone, Copy)]
-pub struct Start<'a> {
+pub struct StepStart<'a> {
     /// Time, s.
     pub time: f64,
     /// Temperatures, K.
@@ -27,7 +27,7 @@ pub struct Start<'a> {
     /// Heat supplied, W.
     pub exchange: &'a Exchange,
     /// Material points.
-    pub memory: &'a Memory,
+    pub memory: &'a PointMemory,
 }
 
 /// Result of a step.
@@ -67,8 +67,8 @@ impl Stepper {
     pub fn rate(
         &mut self,
         problem: &Problem,
-        system: &mut System,
-        state: &Start,
+        system: &mut ThermalSystem,
+        state: &StepStart,
     ) -> Result<(Vec<f64>, Exchange), Error> {
         let mut evaluation = Evaluation::default();
         let temperature = state.temperature;
@@ -86,8 +86,8 @@ impl Stepper {
     pub fn attempt(
         &mut self,
         problem: &Problem,
-        system: &mut System,
-        state: &Start,
+        system: &mut ThermalSystem,
+        state: &StepStart,
         scheme: Scheme,
         [dt, end]: [f64; 2],
         tolerance: f64,
@@ -96,13 +96,13 @@ impl Stepper {
         work: &mut Work,
     ) -> Result<Attempt, Error> {
         let size = system.size();
-        let Start { temperature: start, slope, memory: old, .. } = *state;
+        let StepStart { temperature: start, slope, memory: old, .. } = *state;
         self.temperature.resize(size, 0.0);
         let ahead = |time: f64, guess: &mut [f64]| match slope.is_empty() {
             true => guess.copy_from_slice(start),
             false => set(guess, |k| start[k] + time * slope[k]),
         };
-        let stage = Stage { weight: dt, dt, time: end, known: &[], start, old, stop };
+        let stage = StageEquation { weight: dt, dt, time: end, known: &[], start, old, stop };
         let mut exchange = Exchange::default();
         if scheme == Scheme::BackwardEuler {
             ahead(dt, &mut self.temperature);
@@ -121,8 +121,13 @@ impl Stepper {
         let weight = D * dt;
         self.known.resize(size, 0.0);
         set(&mut self.known, |k| weight * state.rate[k]);
-        let middle =
-            Stage { weight, dt: GAMMA * dt, time: state.time + GAMMA * dt, known: &self.known, ..stage };
+        let middle = StageEquation {
+            weight,
+            dt: GAMMA * dt,
+            time: state.time + GAMMA * dt,
+            known: &self.known,
+            ..stage
+        };
         ahead(GAMMA * dt, &mut self.temperature);
         self.stages.solve(problem, system, &middle, &mut self.temperature, tolerance, work)?;
         self.middle.clone_from(&self.stages.evaluation.rate);
@@ -132,7 +137,7 @@ impl Stepper {
         for (guess, start) in self.temperature.iter_mut().zip(start) {
             *guess = start + (*guess - start) / GAMMA;
         }
-        let last = Stage { weight, known: &self.known, ..stage };
+        let last = StageEquation { weight, known: &self.known, ..stage };
         self.stages.solve(problem, system, &last, &mut self.temperature, tolerance, work)?;
         exchange.add(D * dt, &self.stages.evaluation.exchange);
         let step_ratio = self.stages.evaluation.step_ratio;

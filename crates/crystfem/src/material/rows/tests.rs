@@ -1,18 +1,21 @@
 //! Rows of points agree with single points.
 
 use super::*;
-use crate::kinetics::{Constants, Kinetics};
+use crate::kinetics::{KineticConstants, Kinetics};
 use crate::melting::Melting;
 
 /// Rows agree with [`Crystallization::advance`] and α point by point: cold, hot, long and short increments, z
 /// from 0 to fully crystallized.
 #[test]
-fn rows_are_points() {
+fn rows_agree_with_single_points() {
     for (constants, melting) in [
-        (Constants::TABLE_4_1_COLUMN_1, Some(Melting::PA12)),
-        (Constants::TABLE_4_1_COLUMN_2, None),
-        (Constants { avrami_exponent: 1.0, ..Constants::TABLE_4_1_COLUMN_1 }, Some(Melting::PA12)),
-        (Constants { avrami_exponent: 10.0, ..Constants::APPENDIX_B }, Some(Melting::PA12)),
+        (KineticConstants::TABLE_4_1_COLUMN_1, Some(Melting::PA12)),
+        (KineticConstants::TABLE_4_1_COLUMN_2, None),
+        (
+            KineticConstants { avrami_exponent: 1.0, ..KineticConstants::TABLE_4_1_COLUMN_1 },
+            Some(Melting::PA12),
+        ),
+        (KineticConstants { avrami_exponent: 10.0, ..KineticConstants::APPENDIX_B }, Some(Melting::PA12)),
     ] {
         let law = Crystallization { kinetics: Kinetics::new(constants).unwrap(), melting };
         let (mut start, mut end) = (Vec::new(), Vec::new());
@@ -63,7 +66,7 @@ fn rows_are_points() {
                 let wish = law.advance_all(increments, &[0], &mut own, &mut scratch);
                 let degree = |z| law.kinetics.degree(z);
                 let change = (degree(own[0]) - degree(before)).abs();
-                let exact = (change > 0.0).then(|| (LARGEST_CHANGE / change).clamp(0.1, LONGEST));
+                let exact = (change > 0.0).then(|| (LARGEST_CHANGE / change).clamp(0.1, MAX_STEP_RATIO));
                 assert!(
                     match (wish, exact) {
                         (Some(wish), Some(exact)) => (wish / exact - 1.0).abs() < 1e-12,
@@ -82,7 +85,7 @@ fn rows_are_points() {
 #[test]
 fn increments_that_are_not_finite() {
     for melting in [Some(Melting::PA12), None] {
-        let kinetics = Kinetics::new(Constants::TABLE_4_1_COLUMN_1).unwrap();
+        let kinetics = Kinetics::new(KineticConstants::TABLE_4_1_COLUMN_1).unwrap();
         let law = Crystallization { kinetics, melting };
         let mut scratch = Scratch::default();
         let mut advance = |start: &[f64], end: &[f64]| {

@@ -23,13 +23,13 @@ impl Card {
 }
 
 /// A data line.
-pub(super) struct Row<'a> {
+pub(super) struct DataLine<'a> {
     path: &'a Path,
     text: String,
     pub line: usize,
 }
 
-impl Row<'_> {
+impl DataLine<'_> {
     pub fn text(&self) -> &str {
         &self.text
     }
@@ -66,7 +66,7 @@ impl Row<'_> {
 }
 
 /// A file being read.
-struct Open {
+struct OpenFile {
     path: PathBuf,
     bytes: Vec<u8>,
     at: usize,
@@ -76,7 +76,7 @@ struct Open {
 /// Reader of a file and its includes, card by card. Lines are counted through all files.
 pub(super) struct Cards<'a> {
     path: &'a Path,
-    files: Vec<Open>,
+    files: Vec<OpenFile>,
     line: usize,
     /// First line of each section, its file, and the line in that file.
     parts: Vec<(usize, PathBuf, usize)>,
@@ -86,7 +86,7 @@ pub(super) struct Cards<'a> {
 }
 
 /// Largest depth of includes.
-const DEPTH: usize = 10;
+const MAX_DEPTH: usize = 10;
 
 impl<'a> Cards<'a> {
     pub fn new(path: &'a Path, bytes: &[u8]) -> Self {
@@ -98,7 +98,7 @@ impl<'a> Cards<'a> {
     fn open(&mut self, path: PathBuf, bytes: Vec<u8>) {
         self.bytes += bytes.len();
         self.parts.push((self.line, path.clone(), 0));
-        self.files.push(Open { path, bytes, at: 0, line: 0 });
+        self.files.push(OpenFile { path, bytes, at: 0, line: 0 });
     }
 
     /// Number of included files.
@@ -129,14 +129,14 @@ impl<'a> Cards<'a> {
         while let Some((text, line, end)) = self.peek() {
             self.move_to(line, end);
             let Some(text) = text.strip_prefix('*') else { continue };
-            let text = self.whole(text);
+            let text = self.with_continuation(text);
             return card(self.path, &text, line).map(Some);
         }
         self.fault.take().map_or(Ok(None), Err)
     }
 
     /// Reads the continuation of a keyword line.
-    fn whole(&mut self, text: &str) -> String {
+    fn with_continuation(&mut self, text: &str) -> String {
         let mut text = text.to_owned();
         while text.ends_with(',') {
             let Some((more, line, end)) = self.line_ahead() else { break };
@@ -150,13 +150,13 @@ impl<'a> Cards<'a> {
     }
 
     /// Reads the next data line before the next keyword.
-    pub fn row(&mut self) -> Option<Row<'a>> {
+    pub fn row(&mut self) -> Option<DataLine<'a>> {
         let (text, line, end) = self.peek()?;
         if text.starts_with('*') {
             return None;
         }
         self.move_to(line, end);
-        Some(Row { path: self.path, text, line })
+        Some(DataLine { path: self.path, text, line })
     }
 
     /// Returns the next line of any file that is not an include, see [`Self::line_ahead`].
@@ -177,7 +177,7 @@ impl<'a> Cards<'a> {
                 return Some((text, line, end));
             }
             self.move_to(line, end);
-            let text = self.whole(text.strip_prefix('*')?);
+            let text = self.with_continuation(text.strip_prefix('*')?);
             if let Err(error) = self.include(&text, line) {
                 self.fault = Some(error);
                 return None;
@@ -193,7 +193,7 @@ impl<'a> Cards<'a> {
         if name.is_empty() {
             return wrong("file that is included", "", "*INCLUDE, INPUT=FILE");
         }
-        if self.files.len() > DEPTH {
+        if self.files.len() > MAX_DEPTH {
             return wrong("files in each other", name, "10: does one include itself?");
         }
         let path =

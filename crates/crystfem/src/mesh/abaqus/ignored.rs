@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::cards::{Card, Cards};
 
 /// Scene keys and the keywords they replace.
-const INSTEAD: [(&str, &[&str]); 14] = [
+const REPLACEMENTS: [(&str, &[&str]); 14] = [
     ("`density` of [materials.NAME]", &["DENSITY"]),
     ("`conductivity` of [materials.NAME]", &["CONDUCTIVITY"]),
     ("`specific_heat` of [materials.NAME]", &["SPECIFIC HEAT"]),
@@ -44,10 +44,10 @@ impl Ignored {
     }
 
     /// Writes a note for each keyword with an equivalent, and one for the rest.
-    pub fn tell(self, notes: &mut Vec<String>) {
+    pub fn write_notes(self, notes: &mut Vec<String>) {
         let mut rest = Vec::new();
         for (keyword, (count, line, said)) in self.0 {
-            let instead = INSTEAD.iter().find(|(_, all)| all.contains(&keyword.as_str()));
+            let instead = REPLACEMENTS.iter().find(|(_, all)| all.contains(&keyword.as_str()));
             let why = match instead {
                 Some((instead, _)) => format!("the deck has no units; give {instead}"),
                 None if JOINING.contains(&keyword.as_str()) => {

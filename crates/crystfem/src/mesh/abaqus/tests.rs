@@ -1,7 +1,7 @@
 use super::*;
 use crate::mesh::Face;
 use crate::mesh::surface::area;
-use crate::mesh::{Bar, Block, Grid, Mesh, Split, Substrate};
+use crate::mesh::{Bar, Block, CellSplit, Grid, Mesh, Substrate};
 
 fn fixture(name: &str) -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name)
@@ -44,7 +44,7 @@ fn a_mesh_written_by_meshio() {
 }
 
 #[test]
-fn what_is_written_is_read_back() {
+fn written_meshes_are_read_back() {
     let bar = Bar {
         size: [0.02, 0.004],
         layers: 2,
@@ -52,14 +52,14 @@ fn what_is_written_is_read_back() {
         elements_per_layer: 1,
         element_size: 2e-3,
         substrate: Some(Substrate { size: [0.03, 0.01], thickness: 1e-3, growth: 1.7 }),
-        cells: Split::Hexahedra,
+        cells: CellSplit::Hexahedra,
     };
     let block = Block { name: "brick".into(), lower: [0.0; 3], upper: [1.0; 3] };
     let grid = Grid::uniform([0.0; 3], [1.0; 3], [3, 2, 2]).unwrap();
     let mut both = Grid::uniform([0.0; 3], [1.0; 3], [1, 1, 1]).unwrap().mesh("brick").unwrap();
     both.points.push([5.0 / 3.0, 0.5, 0.5]);
     both.tetrahedra.extend([[1, 3, 5, 8], [3, 7, 5, 8]]);
-    for mesh in [bar.mesh().unwrap(), grid.blocks(&[block], Split::FiveTetrahedra).unwrap(), both] {
+    for mesh in [bar.mesh().unwrap(), grid.blocks(&[block], CellSplit::FiveTetrahedra).unwrap(), both] {
         for diffusive in [false, true] {
             let mut text = Vec::new();
             write(&mesh, diffusive, &mut text).unwrap();
@@ -84,7 +84,7 @@ const BRICK: &str = "*Heading\nby hand\n** a comment\n*Part, name=P\n*Node, nset
     0.25\n*Step\n*Heat transfer\n*End Step\n";
 
 #[test]
-fn all_that_is_understood() {
+fn supported_keywords_are_read() {
     let read = parsed(BRICK);
     let mesh = &read.mesh;
     assert!((read.quality.volume - 1.0).abs() < 1e-15);
@@ -112,7 +112,7 @@ fn all_that_is_understood() {
 }
 
 #[test]
-fn what_is_wrong_is_named_with_its_line() {
+fn errors_name_the_line() {
     let with = |from: &str, to: &str| {
         assert!(BRICK.contains(from), "{from}");
         BRICK.replace(from, to)
@@ -260,7 +260,7 @@ fn orders_do_not_mix() {
 
 /// Lists keywords with an equivalent one by one, with their count and first values.
 #[test]
-fn what_is_not_used_says_what_to_give_instead() {
+fn unused_keywords_name_their_scene_keys() {
     let more = "*Tie, name=glue\na, b\n*Dflux\nBricks, BF, 1.\n*DFLUX, amplitude=RAMP\nagain, BF, 2.\n\
         *initial conditions, type=temperature\nAll, 20.\n*Node File\nNT\n*NODE FILE\nNT\n";
     let notes = parsed(&format!("{BRICK}{more}")).notes;

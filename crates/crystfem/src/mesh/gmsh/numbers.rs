@@ -7,7 +7,7 @@ use crate::file::line_error;
 
 /// Encoding of numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Form {
+enum NumberEncoding {
     Text,
     /// Bytes per size, and true for little-endian order.
     Binary {
@@ -36,12 +36,12 @@ pub(super) struct Numbers<'a> {
     line: usize,
     /// Number of bytes whose line ends are counted already.
     counted: usize,
-    form: Form,
+    form: NumberEncoding,
 }
 
 impl<'a> Numbers<'a> {
     pub fn new(path: &'a Path, bytes: &'a [u8]) -> Self {
-        Self { path, bytes, at: 0, line: 1, counted: 0, form: Form::Text }
+        Self { path, bytes, at: 0, line: 1, counted: 0, form: NumberEncoding::Text }
     }
 
     pub fn line(&self) -> u32 {
@@ -50,8 +50,8 @@ impl<'a> Numbers<'a> {
 
     pub fn error(&self, what: &str, found: impl ToString, allowed: impl Into<String>) -> Error {
         let what = match self.form {
-            Form::Text => what.to_owned(),
-            Form::Binary { .. } => format!("{what}, byte {}", self.at),
+            NumberEncoding::Text => what.to_owned(),
+            NumberEncoding::Binary { .. } => format!("{what}, byte {}", self.at),
         };
         line_error(self.path, self.line, what, found, allowed)
     }
@@ -96,7 +96,7 @@ impl<'a> Numbers<'a> {
                 [0, 0, 0, 1] => false,
                 _ => return Err(self.error("the number 1", format!("{one:?}"), "1 in either byte order")),
             };
-            self.form = Form::Binary { width, little };
+            self.form = NumberEncoding::Binary { width, little };
         }
         self.end("MeshFormat")?;
         Ok(version)
@@ -159,11 +159,11 @@ impl<'a> Numbers<'a> {
     /// Reads a signed number, four bytes in binary.
     pub fn int(&mut self, what: &str) -> Result<i64, Error> {
         match self.form {
-            Form::Text => {
+            NumberEncoding::Text => {
                 let word = self.word();
                 word.parse().map_err(|_| self.error(what, word, "a whole number"))
             }
-            Form::Binary { little, .. } => {
+            NumberEncoding::Binary { little, .. } => {
                 let bytes = self.take::<4>(what)?;
                 Ok(i64::from(if little { i32::from_le_bytes(bytes) } else { i32::from_be_bytes(bytes) }))
             }
@@ -173,15 +173,15 @@ impl<'a> Numbers<'a> {
     /// Reads a count, or a tag of nodes and elements.
     pub fn size(&mut self, what: &str) -> Result<u64, Error> {
         match self.form {
-            Form::Text => {
+            NumberEncoding::Text => {
                 let word = self.word();
                 word.parse().map_err(|_| self.error(what, word, "a whole number, 0 or more"))
             }
-            Form::Binary { width: 4, little } => {
+            NumberEncoding::Binary { width: 4, little } => {
                 let bytes = self.take::<4>(what)?;
                 Ok(u64::from(if little { u32::from_le_bytes(bytes) } else { u32::from_be_bytes(bytes) }))
             }
-            Form::Binary { little, .. } => {
+            NumberEncoding::Binary { little, .. } => {
                 let bytes = self.take::<8>(what)?;
                 Ok(if little { u64::from_le_bytes(bytes) } else { u64::from_be_bytes(bytes) })
             }
@@ -190,7 +190,7 @@ impl<'a> Numbers<'a> {
 
     /// Returns true for binary numbers.
     pub fn is_binary(&self) -> bool {
-        self.form != Form::Text
+        self.form != NumberEncoding::Text
     }
 
     /// Reads the four counts at the start of `$Nodes` and `$Elements`.
@@ -206,11 +206,11 @@ impl<'a> Numbers<'a> {
 
     pub fn double(&mut self, what: &str) -> Result<f64, Error> {
         match self.form {
-            Form::Text => {
+            NumberEncoding::Text => {
                 let word = self.word();
                 word.parse().map_err(|_| self.error(what, word, "a number"))
             }
-            Form::Binary { little, .. } => {
+            NumberEncoding::Binary { little, .. } => {
                 let bytes = self.take::<8>(what)?;
                 Ok(if little { f64::from_le_bytes(bytes) } else { f64::from_be_bytes(bytes) })
             }

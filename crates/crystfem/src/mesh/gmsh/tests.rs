@@ -1,5 +1,5 @@
 use super::*;
-use crate::mesh::surface::{Surface, area};
+use crate::mesh::surface::{OuterSurface, area};
 
 fn fixture(name: &str) -> (std::path::PathBuf, Vec<u8>) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name);
@@ -46,7 +46,7 @@ fn meshes_written_by_gmsh() {
         // the curve from the origin upwards
         assert_eq!(mesh.node_sets["edge"].len(), if name.starts_with('h') { 3 } else { 4 }, "{name}");
         assert_eq!(read.notes, Vec::<String>::new());
-        let outer = Surface::of_all(mesh).unwrap();
+        let outer = OuterSurface::of_all(mesh).unwrap();
         let total: f64 = outer.faces().map(|face| area(mesh, face)).sum();
         assert!((total / 22e-6 - 1.0).abs() < 1e-12);
     }
@@ -124,7 +124,7 @@ const TETRAHEDRON: &str = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Comments\nby h
      $Elements\n1 1 1 1\n3 7 4 1\n11 1 2 3 4\n$EndElements\n";
 
 #[test]
-fn what_is_not_used_is_noted() {
+fn unused_input_is_noted() {
     let read = parse(Path::new("a.msh"), TETRAHEDRON.as_bytes(), 1.0).unwrap();
     assert_eq!(read.mesh.element_sets["physical-9"], [0]);
     assert_eq!((read.node_labels, read.element_labels), (vec![1, 2, 3, 4], vec![11]));
@@ -140,7 +140,7 @@ fn what_is_not_used_is_noted() {
 }
 
 #[test]
-fn what_is_wrong_is_named_with_its_line() {
+fn errors_name_the_line() {
     let with = |from: &str, to: &str| {
         assert!(TETRAHEDRON.contains(from));
         TETRAHEDRON.replace(from, to)

@@ -21,7 +21,7 @@ pub struct Bead {
 /// Times at which elements are covered: when the nozzle is nearest to the centre of an element, in the first
 /// move whose bead contains that centre.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Activation {
+pub struct ActivationTimes {
     /// Time of each element of the mesh, s: −∞ if not requested, +∞ if never covered.
     pub times: Vec<f64>,
     /// Elements never covered, ascending.
@@ -31,7 +31,7 @@ pub struct Activation {
     height: f64,
 }
 
-impl Activation {
+impl ActivationTimes {
     /// Assigns elements never covered the end time of the last bead at their height, as if gaps between beads
     /// were filled. Returns the number of elements without a bead at their height, which remain missed.
     pub fn fill(&mut self, mesh: &Mesh) -> usize {
@@ -52,10 +52,10 @@ impl Activation {
 }
 
 /// Largest position, m, and time, s, of a move: beyond any printer, and with a square far from overflow.
-const FAR: f64 = 1e12;
+const LARGEST_COORDINATE: f64 = 1e12;
 
 /// Largest number of cells along each axis.
-const CELLS: f64 = 512.0;
+const MAX_CELLS: f64 = 512.0;
 
 /// Centres of elements, sorted by cell of a grid over x and y, then by z.
 struct Centres {
@@ -71,7 +71,7 @@ impl Centres {
     fn new(mesh: &Mesh, elements: &[u32], width: f64) -> Self {
         let centres: Vec<[f64; 3]> = elements.iter().map(|element| mesh.centre(*element)).collect();
         let [lower, upper] = bounds(centres.iter().map(|centre| [centre[0], centre[1]]));
-        let size = width.max((upper[0] - lower[0]).max(upper[1] - lower[1]) / CELLS);
+        let size = width.max((upper[0] - lower[0]).max(upper[1] - lower[1]) / MAX_CELLS);
         let rows = ((upper[1] - lower[1]) / size) as u64 + 1;
         let mut all = Self { lower, upper, size, rows, sorted: Vec::new(), places: Vec::new() };
         all.sorted = (0..).zip(&centres).map(|(k, c)| (all.cell([c[0], c[1]]), c[2], k)).collect();
@@ -105,7 +105,7 @@ pub(super) fn activation(
     mesh: &Mesh,
     elements: &[u32],
     bead: Bead,
-) -> Result<Activation, Error> {
+) -> Result<ActivationTimes, Error> {
     for (name, found) in [("width of the bead", bead.width), ("height of the bead", bead.height)] {
         if !(found > 0.0 && found.is_finite()) {
             return Err(Error::Parameter { name, found, allowed: "positive and finite, m".into() });
@@ -121,7 +121,8 @@ pub(super) fn activation(
     let values = |one: &Move| {
         [one.from[0], one.from[1], one.from[2], one.to[0], one.to[1], one.to[2], one.start, one.end]
     };
-    if let Some(value) = path.moves.iter().flat_map(values).find(|value| value.is_nan() || value.abs() > FAR)
+    if let Some(value) =
+        path.moves.iter().flat_map(values).find(|value| value.is_nan() || value.abs() > LARGEST_COORDINATE)
     {
         let allowed = format!("places and times up to {FAR:e} m and s");
         return Err(Error::Parameter { name: "move of the path", found: value, allowed });
@@ -133,7 +134,7 @@ pub(super) fn activation(
         let z = one.to[2];
         let level = levels.entry(z.to_bits()).or_insert((z, one.end));
         level.1 = level.1.max(one.end);
-        lay(one, &centres, bead, &mut earliest);
+        cover(one, &centres, bead, &mut earliest);
     }
     let mut levels: Vec<(f64, f64)> = levels.into_values().collect();
     levels.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
@@ -142,18 +143,18 @@ pub(super) fn activation(
         times[*element as usize] = *time;
     }
     let missed = (0u32..).zip(&times).filter(|(_, time)| **time == f64::INFINITY).map(|(element, _)| element);
-    Ok(Activation { missed: missed.collect(), times, levels, height: bead.height })
+    Ok(ActivationTimes { missed: missed.collect(), times, levels, height: bead.height })
 }
 
 /// Covers centres by a move.
-fn lay(one: &Move, centres: &Centres, bead: Bead, earliest: &mut [f64]) {
+fn cover(one: &Move, centres: &Centres, bead: Bead, earliest: &mut [f64]) {
     let radius = 0.5 * bead.width;
     let from = Vector2::new(one.from[0], one.from[1]);
     let along = Vector2::new(one.to[0], one.to[1]) - from;
     let square = along.norm_squared();
     let Some([first, last]) = clip(from, along, centres, radius) else { return };
     // pieces no longer than four cells, so that the boxes around slanted ones contain few centres
-    let pieces = ((last - first) * square.sqrt() / (4.0 * centres.size)).ceil().clamp(1.0, CELLS) as u32;
+    let pieces = ((last - first) * square.sqrt() / (4.0 * centres.size)).ceil().clamp(1.0, MAX_CELLS) as u32;
     let rise = one.to[2] - one.from[2];
     for piece in 0..pieces {
         let share = |k: u32| first + (last - first) * (f64::from(k) / f64::from(pieces));

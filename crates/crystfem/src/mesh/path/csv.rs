@@ -2,7 +2,7 @@
 
 use super::{Move, ToolPath, error};
 use crate::error::Error;
-use crate::table::{Column, read_with_lines};
+use crate::table::{TableColumn, read_with_lines};
 use polycore::units::dimension::{LengthDimension, RatioDimension, TimeDimension};
 use std::path::Path;
 
@@ -12,13 +12,13 @@ use std::path::Path;
 /// # Errors
 /// Errors of [`crate::table::read`]; [`Error::File`] for times that descend.
 pub fn read_csv(path: &Path) -> Result<ToolPath, Error> {
-    let length = |name| Column::of::<LengthDimension>(name).or_unit("m");
+    let length = |name| TableColumn::new::<LengthDimension>(name).or_unit("m");
     let columns = [
-        Column::of::<TimeDimension>("time").or_unit("s"),
+        TableColumn::new::<TimeDimension>("time").or_unit("s"),
         length("x"),
         length("y"),
         length("z"),
-        Column::of::<RatioDimension>("print"),
+        TableColumn::new::<RatioDimension>("print"),
     ];
     let ([time, x, y, z, print], lines) = read_with_lines(path, columns)?;
     let mut moves = Vec::with_capacity(time.len());

@@ -2,19 +2,19 @@
 
 use super::{Move, ToolPath};
 use crate::error::Error;
-use crate::mesh::voxels::{Frame, Voxels};
+use crate::mesh::voxels::{VoxelGrid, Voxels};
 use polycore::numerics::bounds;
 
 /// Number of pieces per cell along each axis for the volume of beads.
-const PIECES: f64 = 4.0;
+const PIECES_PER_CELL: f64 = 4.0;
 /// Smallest number of pieces across and down a bead.
-const FEW: f64 = 2.0;
+const MIN_PIECES: f64 = 2.0;
 /// Largest number of pieces across and down a bead.
-const MANY: f64 = 64.0;
+const MAX_PIECES: f64 = 64.0;
 
 /// Settings of the cells of a grid, at multiples of their size.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Cells {
+pub struct CellSettings {
     /// Edge lengths, m.
     pub size: [f64; 3],
     /// Diameter of the filament, m.
@@ -25,7 +25,7 @@ pub struct Cells {
     pub least: f64,
 }
 
-impl Cells {
+impl CellSettings {
     /// Returns cells of these edges, m, for filament of 1.75 mm, bead heights from the file, and a smallest
     /// fill fraction of a tenth.
     pub fn new(size: [f64; 3]) -> Self {
@@ -49,7 +49,7 @@ impl ToolPath {
     ///
     /// # Errors
     /// Errors of [`Self::deposit`].
-    pub fn cells(&self, cells: &Cells) -> Result<[f64; 3], Error> {
+    pub fn cells(&self, cells: &CellSettings) -> Result<[f64; 3], Error> {
         Ok(frame(&self.beads(cells)?, cells)?.counts().map(|count| count as f64))
     }
 
@@ -59,7 +59,7 @@ impl ToolPath {
     /// # Errors
     /// [`Error::Parameter`] or [`Error::Mesh`] for sizes that are not positive, a path without extrusion, a
     /// bead without height, too many cells, and a smallest fill fraction that leaves no cell.
-    pub fn deposit(&self, cells: &Cells) -> Result<Deposit, Error> {
+    pub fn deposit(&self, cells: &CellSettings) -> Result<Deposit, Error> {
         let beads = self.beads(cells)?;
         let frame = frame(&beads, cells)?;
         let count = frame.counts().iter().product();
@@ -94,20 +94,20 @@ impl ToolPath {
     }
 
     /// Printing moves that feed filament, with the heights of their beads.
-    fn beads(&self, cells: &Cells) -> Result<Vec<(&Move, f64)>, Error> {
+    fn beads(&self, cells: &CellSettings) -> Result<Vec<(&Move, f64)>, Error> {
         let positive = |name, found: f64| match found > 0.0 && found.is_finite() {
             true => Ok(()),
             false => Err(Error::Parameter { name, found, allowed: "positive and finite, m".into() }),
         };
         positive("diameter of the filament", cells.filament)?;
         positive("height of the bead", cells.height.unwrap_or(1.0))?;
-        if !self.is_fed() {
+        if !self.has_feed() {
             return Err(Error::Mesh(
                 "the path extrudes nothing; allowed: G-code with E in printing moves".into(),
             ));
         }
         let beads: Vec<(&Move, f64)> = self
-            .printing()
+            .printing_moves()
             .zip(self.heights(cells.filament, cells.height))
             .filter(|(one, _)| one.fed > 0.0)
             .collect();
@@ -123,7 +123,7 @@ impl ToolPath {
 }
 
 /// Returns the tool that deposits most in each cell; empty for a single tool.
-fn by_tool(beads: &[(&Move, f64)], frame: &Frame, cells: &Cells, count: usize) -> Vec<u16> {
+fn by_tool(beads: &[(&Move, f64)], frame: &VoxelGrid, cells: &CellSettings, count: usize) -> Vec<u16> {
     let mut known: Vec<u16> = beads.iter().map(|(one, _)| one.tool).collect();
     known.sort_unstable();
     known.dedup();
@@ -146,27 +146,27 @@ fn by_tool(beads: &[(&Move, f64)], frame: &Frame, cells: &Cells, count: usize) -
 }
 
 /// Returns the grid around all beads.
-fn frame(beads: &[(&Move, f64)], cells: &Cells) -> Result<Frame, Error> {
+fn frame(beads: &[(&Move, f64)], cells: &CellSettings) -> Result<VoxelGrid, Error> {
     let [low, high] = bounds(beads.iter().flat_map(|(one, height)| {
         let half = 0.5 * one.area(cells.filament) / height;
         let corners = move |[x, y, z]: [f64; 3]| [[x - half, y - half, z - height], [x + half, y + half, z]];
         [one.from, one.to].into_iter().flat_map(corners)
     }));
-    Frame::around(low, high, cells.size)
+    VoxelGrid::around(low, high, cells.size)
 }
 
 /// Visits the pieces of a bead: centres, volumes and times.
-fn pieces(one: &Move, height: f64, cells: &Cells, mut visit: impl FnMut([f64; 3], f64, f64)) {
+fn pieces(one: &Move, height: f64, cells: &CellSettings, mut visit: impl FnMut([f64; 3], f64, f64)) {
     let along = [0, 1, 2].map(|d| one.to[d] - one.from[d]);
     let across = along[0].hypot(along[1]);
     let normal = [-along[1] / across, along[0] / across];
     let width = one.area(cells.filament) / height;
-    let side = cells.size[0].min(cells.size[1]) / PIECES;
+    let side = cells.size[0].min(cells.size[1]) / PIECES_PER_CELL;
     // tolerance of a billionth for whole numbers
     let count = |length: f64, piece: f64| (length / piece - 1e-9).ceil();
     let lengthwise = count(across, side).max(1.0);
-    let crosswise = count(width, side).clamp(FEW, MANY);
-    let down = count(height, cells.size[2] / PIECES).clamp(FEW, MANY);
+    let crosswise = count(width, side).clamp(MIN_PIECES, MAX_PIECES);
+    let down = count(height, cells.size[2] / PIECES_PER_CELL).clamp(MIN_PIECES, MAX_PIECES);
     let volume = one.volume(cells.filament) / (lengthwise * crosswise * down);
     let part = |k: u64, of: f64| (k as f64 + 0.5) / of;
     for i in 0..lengthwise as u64 {
@@ -190,8 +190,8 @@ mod tests {
     use std::f64::consts::PI;
     use std::path::Path;
 
-    const MILLIMETRE: Cells =
-        Cells { size: [5e-4, 5e-4, 2.5e-4], filament: 1.75e-3, height: None, least: 0.0 };
+    const MILLIMETRE: CellSettings =
+        CellSettings { size: [5e-4, 5e-4, 2.5e-4], filament: 1.75e-3, height: None, least: 0.0 };
 
     fn parsed(text: &str) -> ToolPath {
         parse(Path::new("a.gcode"), text.as_bytes()).unwrap()
@@ -216,21 +216,25 @@ mod tests {
         assert!(found.fill.iter().all(|fill| (fill - 0.8).abs() < 1e-9), "{:?}", &found.fill[..5]);
         let (values, of) = found.bins();
         assert!(values.len() == 1 && (values[0] - 0.8).abs() < 1e-12 && of.iter().all(|bin| *bin == 0));
-        assert!(!found.may_be_full());
+        assert!(!found.can_be_full());
         assert!((found.ratio - 1.25).abs() < 1e-9 && found.left_out.abs() < 1e-9);
         let whole: f64 = found.fill.iter().sum::<f64>() * 5e-4 * 5e-4 * 2.5e-4;
         assert!((whole / found.volume - 1.0).abs() < 1e-12);
         // half cells: 0.25 mm into each at 10 mm/s
         for (element, time) in times.iter().enumerate() {
             let (column, line) = (element % 20, element / 20);
-            let start = path.printing().nth(line).unwrap().start;
+            let start = path.printing_moves().nth(line).unwrap().start;
             let exact = start + (0.5 * column as f64 + 0.25) / 10.0;
             assert!((time - exact).abs() < 0.126 / 10.0, "{element}: {time} {exact}");
         }
-        let error = |cells: Cells| path.deposit(&cells).unwrap_err().to_string();
-        assert!(error(Cells { size: [0.0, 1.0, 1.0], ..MILLIMETRE }).contains("size of a cell: found 0"));
-        assert!(error(Cells { least: 1.0, ..MILLIMETRE }).contains("least filled part of a cell: found 1"));
-        assert!(error(Cells { size: [1e-9; 3], ..MILLIMETRE }).contains("nodes of a structured mesh"));
+        let error = |cells: CellSettings| path.deposit(&cells).unwrap_err().to_string();
+        assert!(
+            error(CellSettings { size: [0.0, 1.0, 1.0], ..MILLIMETRE }).contains("size of a cell: found 0")
+        );
+        assert!(
+            error(CellSettings { least: 1.0, ..MILLIMETRE }).contains("least filled part of a cell: found 1")
+        );
+        assert!(error(CellSettings { size: [1e-9; 3], ..MILLIMETRE }).contains("nodes of a structured mesh"));
         assert!(
             parsed("G1 X1 F60\n").deposit(&MILLIMETRE).unwrap_err().to_string().contains("extrudes nothing")
         );
@@ -241,7 +245,7 @@ mod tests {
     fn volume_is_kept() {
         let path = parsed("M83\nG1 F600 Z0.2\nG1 X7 Y3 E0.3\nG3 X0 Y10 R5 E0.9\n");
         for least in [0.0, 0.3] {
-            let found = path.deposit(&Cells { least, ..MILLIMETRE }).unwrap().voxels;
+            let found = path.deposit(&CellSettings { least, ..MILLIMETRE }).unwrap().voxels;
             let sum: f64 = found.fill.iter().sum();
             assert!((sum * 6.25e-11 / (1.2e-3 * 0.25 * PI * 1.75e-3f64.powi(2)) - 1.0).abs() < 1e-12);
             assert!(found.fill.iter().all(|fill| *fill > least) && (found.left_out > 0.0) == (least > 0.0));
@@ -266,7 +270,7 @@ mod tests {
                 continue;
             }
             let path = crate::mesh::path::read_gcode(&path).unwrap();
-            let cells = Cells { size: [size[0], size[0], size[1]], least: 0.1, ..MILLIMETRE };
+            let cells = CellSettings { size: [size[0], size[0], size[1]], least: 0.1, ..MILLIMETRE };
             let found = path.deposit(&cells).unwrap().voxels;
             assert_eq!(found.fill.len(), count, "{file} {size:?}");
             assert!((1e9 * found.volume - volume).abs() < 1e-4 && (found.ratio - ratio).abs() < 5.1e-5);

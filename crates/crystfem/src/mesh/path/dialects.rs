@@ -212,9 +212,9 @@ fn features_have_one_name() {
         ("OrcaSlicer", &orca, "walls", None),
     ] {
         let mut path = parsed(text);
-        let all = path.printing().count();
-        assert_eq!(path.without(name), count, "{dialect} {name}");
-        assert_eq!(all - path.printing().count(), count.unwrap_or(0), "{dialect} {name}");
+        let all = path.printing_moves().count();
+        assert_eq!(path.remove_feature(name), count, "{dialect} {name}");
+        assert_eq!(all - path.printing_moves().count(), count.unwrap_or(0), "{dialect} {name}");
     }
     let shares = parsed(&cura);
     let shares = shares.shares();
@@ -247,7 +247,8 @@ fn extrusion_by_volume() {
         ),
     ] {
         let path = parsed(text);
-        let found: f64 = path.printing().map(|one| 1e9 * one.volume(path.filament.unwrap_or(FILAMENT))).sum();
+        let found: f64 =
+            path.printing_moves().map(|one| 1e9 * one.volume(path.filament.unwrap_or(FILAMENT))).sum();
         assert!((found - volume).abs() < 1e-9, "{dialect}: {found} {volume}");
     }
 }
@@ -281,15 +282,15 @@ fn files_of_other_kinds() {
             .contains("START_PRINT (2), M73 (1)")
     );
     let mut loose = parsed("M83\nG1 X10 E1 F600\nG0 X0 Z15\nG1 X8 Z.2 E1\nG1 X18 E8\n");
-    let (count, line, share) = loose.without_loose().unwrap();
-    assert!(count == 2 && line == 2 && (share - 0.2).abs() < 1e-12 && loose.printing().count() == 1);
+    let (count, line, share) = loose.remove_loose().unwrap();
+    assert!(count == 2 && line == 2 && (share - 0.2).abs() < 1e-12 && loose.printing_moves().count() == 1);
 }
 
 /// Times with limits stated in the file agree with closed forms: from rest to rest with jerk and
 /// acceleration.
 #[test]
 fn limits_of_the_file() {
-    let time = |text: &str| parsed(text).as_stated().duration();
+    let time = |text: &str| parsed(text).with_stated_limits().duration();
     // both ends at jerk speed j: L/v + (v − j)²/(v a)
     let with_jerk = |length: f64, v: f64, a: f64, j: f64| length / v + (v - j).powi(2) / (v * a);
     let one = "G1 X100 F3000\n";
@@ -343,7 +344,7 @@ fn limits_of_the_file() {
     let stopped = time("M83\nM204 S500 T500\nM205 X10 E10\nG1 X50 F3000\nG1 E-1 F3000\nG1 X100 F3000\n");
     assert!(stopped > through + 0.1, "{through} {stopped}");
     // commands shift with the moves
-    let path = parsed("M204 S500\nG1 X100 F3000\nG4 S3\nM104 S200\nG1 X0\n").as_stated();
+    let path = parsed("M204 S500\nG1 X100 F3000\nG4 S3\nM104 S200\nG1 X0\n").with_stated_limits();
     assert!((path.commands[0].time - path.moves[1].start).abs() < 1e-9);
 }
 
@@ -381,14 +382,14 @@ fn time_of_prusa_slicer() {
     text += "G1 E-2.24 F4200\nG1 F8640 X84.7 Y82.777 E-.912\nG1 E-.048 F4200\nG1 Z3.2 F10800\nG1 E-1 F2100\n\
         G1 Z5 F720\nG1 X178 Y178 F4200\nG1 Z33 F720\n";
     let path = parsed(&text);
-    let found = path.clone().as_stated().duration();
+    let found = path.clone().with_stated_limits().duration();
     assert!((found / 67.0 - 1.0).abs() < 0.01, "{found}");
     assert!(path.duration() < 0.94 * 67.0, "{}", path.duration());
 }
 
 #[test]
 fn estimates_are_compared() {
-    let told = |text: &str| parsed(text).compared("at F").unwrap();
+    let told = |text: &str| parsed(text).compare_estimate("at F").unwrap();
     let go = "G1 X100 F600\n";
     assert!(told(&format!("{go};TIME:10\n")).ends_with("and 10 s as its slicer estimates (+0.0 %)"));
     let off = told(&format!("{go}; estimated printing time (normal mode) = 12s\n"));
@@ -400,12 +401,17 @@ fn estimates_are_compared() {
         bambu.starts_with("from the first layer on the path takes 10 s at F") && bambu.contains("+0.0 %"),
         "{bambu}"
     );
-    assert_eq!(parsed(go).compared("at F"), None);
+    assert_eq!(parsed(go).compare_estimate("at F"), None);
     let lines = parsed(&format!(
         "M83\n{go};LAYER_CHANGE\n;TYPE:Perimeter\nG1 X0 E1\n;TYPE:Solid infill\nG1 X10 E3\n"
     ))
     .summary(1.75e-3);
-    assert!(lines[0].starts_with("the file prints 1 marked layer, middle lines from (0, 0, 0) mm to (100, \
-        0, 0) mm, 9.621 mm³ of 4.0 mm"), "{lines:?}");
+    assert!(
+        lines[0].starts_with(
+            "the file prints 1 marked layer, middle lines from (0, 0, 0) mm to (100, \
+        0, 0) mm, 9.621 mm³ of 4.0 mm"
+        ),
+        "{lines:?}"
+    );
     assert_eq!(lines[1], "by feature: `Solid infill` 75.0 %, `Perimeter` 25.0 %");
 }

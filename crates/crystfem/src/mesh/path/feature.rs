@@ -3,7 +3,7 @@
 use super::{Move, ToolPath};
 
 /// Feature of moves before the first layer, in files with layer marks.
-pub(super) const BEFORE: &str = "before the first layer";
+pub(super) const BEFORE_FIRST_LAYER: &str = "before the first layer";
 
 /// Unified feature names, by which beads can be removed for any slicer.
 pub const FAMILIES: [&str; 20] = [
@@ -71,7 +71,7 @@ fn families(plain: &str) -> &'static [&'static str] {
 }
 
 /// Returns true if a feature of a file matches a name.
-fn goes_by(feature: &str, name: &str) -> bool {
+fn has_name(feature: &str, name: &str) -> bool {
     let (own, asked) = (plain(feature), plain(name));
     let asked = match asked.as_str() {
         "prime-tower" => "wipe-tower",
@@ -96,7 +96,7 @@ impl ToolPath {
     /// Printed features with their fractions of the filament fed, largest first; `""` for unnamed ones.
     pub fn shares(&self) -> Vec<(&str, f64)> {
         let mut fed = vec![0.0; self.features.len().max(1)];
-        for one in self.printing() {
+        for one in self.printing_moves() {
             if let Some(sum) = fed.get_mut(usize::from(one.feature)) {
                 *sum += one.fed;
             }
@@ -111,9 +111,9 @@ impl ToolPath {
 
     /// Turns beads of a feature (one of [`FAMILIES`], or a name of the file) into travel moves. Returns their
     /// number; `None` for an unknown name.
-    pub fn without(&mut self, name: &str) -> Option<usize> {
-        let hit: Vec<bool> = self.features.iter().map(|feature| goes_by(feature, name)).collect();
-        let known = hit.contains(&true) || FAMILIES.iter().any(|family| goes_by(family, name));
+    pub fn remove_feature(&mut self, name: &str) -> Option<usize> {
+        let hit: Vec<bool> = self.features.iter().map(|feature| has_name(feature, name)).collect();
+        let known = hit.contains(&true) || FAMILIES.iter().any(|family| has_name(family, name));
         let mut count = 0;
         for one in self.moves.iter_mut().filter(|one| one.prints) {
             if hit.get(usize::from(one.feature)) == Some(&true) {

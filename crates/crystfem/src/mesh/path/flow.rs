@@ -4,7 +4,7 @@ use super::{Move, Setting, ToolPath};
 use std::f64::consts::PI;
 
 /// Distance below which levels are equal, m.
-const SAME: f64 = 5e-8;
+const LEVEL_TOLERANCE: f64 = 5e-8;
 
 /// Width of a bead of cross-section `area` and height `height`, m: a rectangle between two half circles, A/h
 /// + h(1 − π/4).
@@ -26,20 +26,20 @@ impl Move {
 
 impl ToolPath {
     /// Returns true if the file states filament feed.
-    pub fn is_fed(&self) -> bool {
-        self.printing().any(|one| one.fed > 0.0)
+    pub fn has_feed(&self) -> bool {
+        self.printing_moves().any(|one| one.fed > 0.0)
     }
 
     /// Filament fed in printing moves, m.
     pub fn fed(&self) -> f64 {
-        self.printing().map(|one| one.fed).sum()
+        self.printing_moves().map(|one| one.fed).sum()
     }
 
     /// Heights at which printing moves end, m, ascending, without duplicates from rounding.
     pub fn levels(&self) -> Vec<f64> {
-        let mut levels: Vec<f64> = self.printing().map(|one| one.to[2]).collect();
+        let mut levels: Vec<f64> = self.printing_moves().map(|one| one.to[2]).collect();
         levels.sort_unstable_by(f64::total_cmp);
-        levels.dedup_by(|next, kept| *next - *kept < SAME);
+        levels.dedup_by(|next, kept| *next - *kept < LEVEL_TOLERANCE);
         levels
     }
 

@@ -3,17 +3,17 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use super::comments::Comments;
 use super::limits::Limits;
-use super::line::{self, Command as Line, Words};
-use super::printer::{Printer, With};
-use super::remark::Remarks;
-use super::{Command, Setting, ToolPath, error, told};
+use super::line::{self, GcodeCommand, Words};
+use super::printer::{MoveAttributes, Printer};
+use super::{Command, Setting, ToolPath, error, list_counts};
 use crate::error::Error;
 
 /// 0 °C, K.
 pub(super) const CELSIUS: f64 = 273.15;
 /// Largest tool number: firmwares use larger ones for other purposes.
-const MOST_TOOLS: f64 = 63.0;
+const MAX_TOOLS: f64 = 63.0;
 
 /// Reads a G-code file for Marlin, Klipper or RepRapFirmware: G0 and G1 with X, Y, Z, E, F, also without the
 /// command in a line of words alone; arcs G2 and G3 in the XY plane with I and J or R, as chords within 0.01
@@ -21,7 +21,7 @@ const MOST_TOOLS: f64 = 63.0;
 /// relative; after M82 or M83, G90 and G91 do not affect E), G92 (set position), M200 (E is a volume), tools
 /// (T), M104 and M109 of the selected tool or that of T, G10 with P and S likewise, M140 and M190
 /// (temperatures; the waiting time is unknown), M106 and M107 of the part fan; machine limits (M201 to M205,
-/// M566, SET_VELOCITY_LIMIT), which [`ToolPath::as_stated`] applies; SAVE_GCODE_STATE and
+/// M566, SET_VELOCITY_LIMIT), which [`ToolPath::with_stated_limits`] applies; SAVE_GCODE_STATE and
 /// RESTORE_GCODE_STATE; features, heights and layers in comments. A move deposits material if E increases
 /// along it and it moves horizontally. Velocity is F all along a move. Other commands are skipped and counted
 /// in a note.
@@ -43,7 +43,7 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<ToolPath, Error> {
     let end = if bytes.contains(&b'\n') { b'\n' } else { b'\r' };
     let lines = || (1..).zip(bytes.split(|byte| *byte == end));
     let mut limits = Limits::default();
-    let mut first = Remarks::new(false);
+    let mut first = Comments::new(false);
     for (_, text) in lines().filter(|(_, text)| text.contains(&b';')) {
         let text = String::from_utf8_lossy(text);
         if let (_, Some(comment)) = line::split(text.trim_end()) {
@@ -53,7 +53,7 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<ToolPath, Error> {
     if first.limits_ignored {
         limits = Limits::default();
     }
-    let mut reader = Reader::new(path, first, limits);
+    let mut reader = GcodeReader::new(path, first, limits);
     for (line, text) in lines() {
         reader.line(line, &String::from_utf8_lossy(text))?;
     }
@@ -79,10 +79,10 @@ fn text_of<'a>(path: &Path, bytes: &'a [u8]) -> Result<&'a [u8], Error> {
 }
 
 /// State of the reader.
-struct Reader<'a> {
+struct GcodeReader<'a> {
     path: &'a Path,
     printer: Printer,
-    remarks: Remarks,
+    remarks: Comments,
     tool_path: ToolPath,
     limits: Limits,
     /// Counts of skipped commands.
@@ -101,9 +101,9 @@ struct Reader<'a> {
     change: f64,
 }
 
-impl<'a> Reader<'a> {
-    fn new(path: &'a Path, first: Remarks, limits: Limits) -> Self {
-        let mut remarks = Remarks::new(first.layers > 0);
+impl<'a> GcodeReader<'a> {
+    fn new(path: &'a Path, first: Comments, limits: Limits) -> Self {
+        let mut remarks = Comments::new(first.layers > 0);
         let mut first_volume = None;
         (remarks.estimate, remarks.filaments) = (first.estimate, first.filaments);
         (remarks.bambu, remarks.per_minute) = (first.bambu, first.per_minute);
@@ -111,7 +111,7 @@ impl<'a> Reader<'a> {
         let mut printer = Printer::new();
         if remarks.volumetric {
             let diameter = remarks.filaments.first().copied().unwrap_or(super::FILAMENT);
-            printer.volumetric = (0..=MOST_TOOLS as u16).map(|tool| (tool, diameter)).collect();
+            printer.volumetric = (0..=MAX_TOOLS as u16).map(|tool| (tool, diameter)).collect();
             first_volume = Some(diameter);
         }
         Self {
@@ -134,8 +134,10 @@ impl<'a> Reader<'a> {
         let (code, comment) = line::split(text.trim_end());
         for command in line::commands(&code) {
             match command {
-                Line::Code(letter, number, words) => self.code(line, &code, letter, number, &words)?,
-                Line::Again(words) => match self.motion {
+                GcodeCommand::Code(letter, number, words) => {
+                    self.code(line, &code, letter, number, &words)?
+                }
+                GcodeCommand::Again(words) => match self.motion {
                     Some(motion) => {
                         self.repeated += 1;
                         self.run_command(line, &code, motion, &words)?;
@@ -143,7 +145,7 @@ impl<'a> Reader<'a> {
                     None if words.wrong.is_some() => return Err(self.wrong(line, &words)),
                     None => self.skip("words without a command"),
                 },
-                Line::Named(name, rest) => self.named(name, rest),
+                GcodeCommand::Named(name, rest) => self.named(name, rest),
             }
         }
         if let Some(comment) = comment {
@@ -171,7 +173,7 @@ impl<'a> Reader<'a> {
         }
         self.motion = Some(code);
         let arc = [None, None, Some(-1.0), Some(1.0)][code as usize];
-        let with = With {
+        let with = MoveAttributes {
             height: self.remarks.height(),
             feature: self.remarks.feature,
             limits: (self.tool_path.limits.len() - 1) as u32,
@@ -244,7 +246,7 @@ impl<'a> Reader<'a> {
                     self.factors.push(factor);
                 }
             }
-            _ if letter == 'T' && number.fract() == 0.0 && (0.0..=MOST_TOOLS).contains(&number) => {
+            _ if letter == 'T' && number.fract() == 0.0 && (0.0..=MAX_TOOLS).contains(&number) => {
                 self.select(number as u16);
             }
             _ => self.skip(&code),
@@ -292,7 +294,7 @@ impl<'a> Reader<'a> {
             return Ok(());
         }
         let own = self.printer.tool;
-        let tool = tool.filter(|tool| (0.0..=MOST_TOOLS).contains(tool)).map_or(own, |tool| tool as u16);
+        let tool = tool.filter(|tool| (0.0..=MAX_TOOLS).contains(tool)).map_or(own, |tool| tool as u16);
         self.hot.insert(tool, value);
         if tool == own {
             self.set(Setting::Nozzle, value);
@@ -319,7 +321,7 @@ impl<'a> Reader<'a> {
 
     /// Handles M200: D is the diameter; D0 or S0 ends it.
     fn volumetric(&mut self, words: &Words) {
-        let tool = words.value('T').map_or(self.printer.tool, |tool| tool.clamp(0.0, MOST_TOOLS) as u16);
+        let tool = words.value('T').map_or(self.printer.tool, |tool| tool.clamp(0.0, MAX_TOOLS) as u16);
         let diameter = words.value('D').map(|d| d * self.printer.unit);
         let known = || self.remarks.filaments.get(usize::from(tool)).copied().unwrap_or(super::FILAMENT);
         if words.value('S') == Some(0.0) || diameter == Some(0.0) {
@@ -343,7 +345,7 @@ impl<'a> Reader<'a> {
                 let extruder = line::keys(rest).find(|(key, _)| key == "EXTRUDER").map(|(_, value)| value);
                 let number = extruder.and_then(|name| name.strip_prefix("extruder"));
                 match number.map(|digits| if digits.is_empty() { Ok(0) } else { digits.parse::<u16>() }) {
-                    Some(Ok(tool)) if f64::from(tool) <= MOST_TOOLS => self.select(tool),
+                    Some(Ok(tool)) if f64::from(tool) <= MAX_TOOLS => self.select(tool),
                     _ => self.skip(&upper),
                 }
             }
@@ -444,7 +446,7 @@ impl<'a> Reader<'a> {
             ));
         }
         if !self.skipped.is_empty() {
-            path.notes.push(format!("commands not used: {}", told(&mut self.skipped)));
+            path.notes.push(format!("commands not used: {}", list_counts(&mut self.skipped)));
         }
         Ok(path)
     }

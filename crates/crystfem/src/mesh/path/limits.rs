@@ -9,7 +9,7 @@ const JERK: [f64; 4] = [10e-3, 10e-3, 0.4e-3, 5e-3];
 /// Default square corner velocity of Klipper, m/s.
 const SQUARE_CORNER: f64 = 5e-3;
 /// Largest plausible M203 in mm/s; larger values are per minute.
-const FAST: f64 = 2000.0;
+const MAX_MILLIMETRES_PER_SECOND: f64 = 2000.0;
 
 /// Limits of a straight motion: length, m, velocity, m/s, acceleration, m/s², and entry velocity.
 #[derive(Clone, Copy, Debug)]
@@ -56,7 +56,8 @@ impl Limits {
     pub fn command(&mut self, code: &str, words: &Words, per_minute: bool) {
         let positive =
             |letter: char| words.value(letter).filter(|found| *found > 0.0).map(|found| 1e-3 * found);
-        let minutes = |all: &[f64; 4]| per_minute || all.iter().any(|v| *v > 1e-3 * FAST);
+        let minutes =
+            |all: &[f64; 4]| per_minute || all.iter().any(|v| *v > 1e-3 * MAX_MILLIMETRES_PER_SECOND);
         let mut of_axes = AXES.map(|axis| positive(axis).unwrap_or(0.0));
         self.stated = true;
         match code {

@@ -2,7 +2,7 @@
 
 /// A command: `G1 X10`, or by name (`START_PRINT BED=60`).
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Command<'a> {
+pub(super) enum GcodeCommand<'a> {
     /// Letter, number, and the words after them.
     Code(char, f64, Words),
     /// Words alone, which repeat the last move.
@@ -45,7 +45,7 @@ pub(super) fn split(text: &str) -> (String, Option<&str>) {
 }
 
 /// Splits a line without comments into commands: one, or several that begin with G or M after a G.
-pub(super) fn commands(code: &str) -> Vec<Command<'_>> {
+pub(super) fn commands(code: &str) -> Vec<GcodeCommand<'_>> {
     let code = without_number(code.trim());
     let Some(first) = code.chars().next().filter(|first| *first != '%') else { return Vec::new() };
     let head = code.find(|c: char| !(c.is_ascii_alphanumeric() || "_.".contains(c))).unwrap_or(code.len());
@@ -53,26 +53,26 @@ pub(super) fn commands(code: &str) -> Vec<Command<'_>> {
     let number = after.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c));
     if !first.is_ascii_alphabetic() || !number || code[..head].contains('_') {
         let end = code.find(char::is_whitespace).unwrap_or(code.len());
-        return vec![Command::Named(&code[..end], code[end..].trim())];
+        return vec![GcodeCommand::Named(&code[..end], code[end..].trim())];
     }
     let words = words(code);
     let upper = first.to_ascii_uppercase();
     if "XYZEFIJR".contains(upper) {
-        return vec![Command::Again(words)];
+        return vec![GcodeCommand::Again(words)];
     }
-    let mut all: Vec<Command> = Vec::new();
+    let mut all: Vec<GcodeCommand> = Vec::new();
     for (letter, number) in words.all {
         match all.last_mut() {
             // no G code has a parameter M or G
-            Some(Command::Code('G', _, own)) if !"GM".contains(letter) => own.all.push((letter, number)),
-            Some(Command::Code(of, _, own)) if *of != 'G' => own.all.push((letter, number)),
-            _ => all.push(Command::Code(letter, number, Words::default())),
+            Some(GcodeCommand::Code('G', _, own)) if !"GM".contains(letter) => own.all.push((letter, number)),
+            Some(GcodeCommand::Code(of, _, own)) if *of != 'G' => own.all.push((letter, number)),
+            _ => all.push(GcodeCommand::Code(letter, number, Words::default())),
         }
     }
     match all.last_mut() {
-        Some(Command::Code(_, _, own)) => own.wrong = words.wrong,
+        Some(GcodeCommand::Code(_, _, own)) => own.wrong = words.wrong,
         // the number itself is invalid
-        _ => return vec![Command::Again(Words { all: Vec::new(), wrong: words.wrong })],
+        _ => return vec![GcodeCommand::Again(Words { all: Vec::new(), wrong: words.wrong })],
     }
     all
 }
@@ -121,10 +121,10 @@ mod tests {
     fn lines_of_every_dialect() {
         let told = |text: &str| -> Vec<String> {
             let (code, _) = split(text);
-            let one = |command: &Command| match command {
-                Command::Code(letter, number, words) => format!("{letter}{number} {:?}", words.all),
-                Command::Again(words) => format!("again {:?} {:?}", words.all, words.wrong),
-                Command::Named(name, rest) => format!("{name} | {rest}"),
+            let one = |command: &GcodeCommand| match command {
+                GcodeCommand::Code(letter, number, words) => format!("{letter}{number} {:?}", words.all),
+                GcodeCommand::Again(words) => format!("again {:?} {:?}", words.all, words.wrong),
+                GcodeCommand::Named(name, rest) => format!("{name} | {rest}"),
             };
             commands(&code).iter().map(one).collect()
         };

@@ -1,15 +1,15 @@
 //! State of a printer, and its changes by moves and arcs.
 
-use super::{Motion, Move};
+use super::{MachineMotion, Move};
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
 /// Largest distance of chords from their arc, m.
-const CHORD: f64 = 1e-5;
+const CHORD_ERROR: f64 = 1e-5;
 /// Limit on chords of an arc.
-const MOST_CHORDS: f64 = 1e6;
+const MAX_CHORDS: f64 = 1e6;
 /// Largest distance of an arc's end from its circle: as a fraction of the radius, and m (digits of files).
-const MISS: (f64, f64) = (1e-2, 2e-5);
+const ARC_TOLERANCE: (f64, f64) = (1e-2, 2e-5);
 
 /// Invalid word of a move.
 pub(super) struct MoveError {
@@ -49,12 +49,12 @@ pub(super) struct Printer {
     /// the line of the first.
     pub doubtful: (usize, u32),
     /// States saved by SAVE_GCODE_STATE, by name.
-    saved: BTreeMap<String, Saved>,
+    saved: BTreeMap<String, SavedState>,
 }
 
 /// Saved modes, velocity and offsets of a [`Printer`].
 #[derive(Clone, Copy, Debug)]
-struct Saved {
+struct SavedState {
     relative: bool,
     relative_feed: Option<bool>,
     velocity: f64,
@@ -64,7 +64,7 @@ struct Saved {
 
 /// Attributes of a move.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct With {
+pub(super) struct MoveAttributes {
     pub height: f64,
     pub feature: u16,
     pub limits: u32,
@@ -84,9 +84,9 @@ impl Printer {
         &mut self,
         value: impl Fn(char) -> Option<f64>,
         arc: Option<f64>,
-        with: With,
+        with: MoveAttributes,
         moves: &mut Vec<Move>,
-        motions: &mut Vec<Motion>,
+        motions: &mut Vec<MachineMotion>,
     ) -> Result<(), MoveError> {
         let velocity = |found| MoveError {
             what: "velocity F",
@@ -142,7 +142,7 @@ impl Printer {
         }
         let start = self.time;
         self.time += way / self.velocity;
-        let mut motion = Motion {
+        let mut motion = MachineMotion {
             delta: [0.0, 0.0, 0.0, fed],
             start,
             end: self.time,
@@ -165,7 +165,7 @@ impl Printer {
             };
             let (prints, fed) = (fed > 0.0 && across, fed / count);
             let (from, start) = before;
-            let With { height, feature, line, .. } = with;
+            let MoveAttributes { height, feature, line, .. } = with;
             moves.push(Move { from, to, start, end, prints, fed, height, feature, tool: self.tool, line });
             motion.delta = [to[0] - from[0], to[1] - from[1], to[2] - from[2], fed];
             (motion.start, motion.end) = (start, end);
@@ -201,7 +201,7 @@ impl Printer {
             (None, None, Some(radius)) => {
                 let own = radius.abs() * self.unit;
                 // half a digit of the file
-                if own < 0.5 * way - MISS.1 {
+                if own < 0.5 * way - ARC_TOLERANCE.1 {
                     let allowed = format!("{} or more in size", 0.5 * way / self.unit);
                     return Err(MoveError { what: "radius of an arc", found: Some(radius), allowed });
                 }
@@ -218,7 +218,7 @@ impl Printer {
         let radius = |place: [f64; 3]| (place[0] - centre[0]).hypot(place[1] - centre[1]);
         let angle = |place: [f64; 3]| (place[1] - centre[1]).atan2(place[0] - centre[0]);
         let (first, last) = (radius(from), radius(to));
-        if (first - last).abs() > MISS.0 * first + MISS.1 {
+        if (first - last).abs() > ARC_TOLERANCE.0 * first + ARC_TOLERANCE.1 {
             let [first, last] = [first, last].map(|radius| (1e9 * radius).round() / 1e9 / self.unit);
             let allowed = format!("as far as its start, {first} from its centre");
             return Err(MoveError {
@@ -235,8 +235,8 @@ impl Printer {
             sweep = TAU;
         }
         // sagitta r (1 − cos(φ/2))
-        let most = 2.0 * (1.0 - CHORD / first).clamp(-1.0, 1.0).acos();
-        let count = (sweep / most).ceil().clamp(1.0, MOST_CHORDS) as u32;
+        let most = 2.0 * (1.0 - CHORD_ERROR / first).clamp(-1.0, 1.0).acos();
+        let count = (sweep / most).ceil().clamp(1.0, MAX_CHORDS) as u32;
         let begin = angle(from);
         let places = (1..=count).map(|k| {
             if k == count {
@@ -280,7 +280,7 @@ impl Printer {
     /// Saves modes, velocity and offsets under a name, like Klipper.
     pub fn save(&mut self, name: &str) {
         let Self { relative, relative_feed, velocity, offset, feed, .. } = *self;
-        let state = Saved { relative, relative_feed, velocity, offset, feed };
+        let state = SavedState { relative, relative_feed, velocity, offset, feed };
         self.saved.insert(name.to_owned(), state);
     }
 

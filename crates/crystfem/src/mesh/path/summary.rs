@@ -4,16 +4,16 @@ use super::ToolPath;
 use polycore::numerics::bounds;
 
 /// Drop of a printing move, m, above which it may print into the air.
-const FALL: f64 = 1e-3;
+const LOOSE_DROP: f64 = 1e-3;
 /// Slope of such a drop.
-const STEEP: f64 = 0.2;
+const LOOSE_SLOPE: f64 = 0.2;
 /// Largest number of listed features.
-const LISTED: usize = 12;
+const MAX_LISTED: usize = 12;
 
 impl ToolPath {
     /// Tools that print, ascending.
     pub fn tools(&self) -> Vec<u16> {
-        let mut tools: Vec<u16> = self.printing().map(|one| one.tool).collect();
+        let mut tools: Vec<u16> = self.printing_moves().map(|one| one.tool).collect();
         tools.sort_unstable();
         tools.dedup();
         tools
@@ -22,13 +22,13 @@ impl ToolPath {
     /// Turns beads without room above the bed (z ≤ 0) or falling through the air, as in purges of some
     /// printers, into travel moves. Returns their number, the line of the first, and their fraction of the
     /// filament.
-    pub fn without_loose(&mut self) -> Option<(usize, u32, f64)> {
+    pub fn remove_loose(&mut self) -> Option<(usize, u32, f64)> {
         let whole = self.fed();
         let (mut count, mut line, mut fed) = (0, 0, 0.0);
         for one in self.moves.iter_mut().filter(|one| one.prints && one.fed > 0.0) {
             let across = (one.to[0] - one.from[0]).hypot(one.to[1] - one.from[1]);
             let fall = one.from[2] - one.to[2];
-            if one.to[2].max(one.from[2]) <= 0.0 || (fall > FALL && fall > STEEP * across) {
+            if one.to[2].max(one.from[2]) <= 0.0 || (fall > LOOSE_DROP && fall > LOOSE_SLOPE * across) {
                 line = if count == 0 { one.line } else { line };
                 count += 1;
                 fed += one.fed;
@@ -41,14 +41,14 @@ impl ToolPath {
     /// Layers, bounding box, filament, volume and time of the print, and the volume fraction of each feature.
     /// `filament` is the diameter, m.
     pub fn summary(&self, filament: f64) -> Vec<String> {
-        let ends = || self.printing().flat_map(|one| [one.from, one.to]);
+        let ends = || self.printing_moves().flat_map(|one| [one.from, one.to]);
         let [low, high] = bounds(ends());
         let place = |at: [f64; 3]| {
             let [x, y, z] = at.map(|x| (1e6 * x).round() / 1e3);
             format!("({x}, {y}, {z}) mm")
         };
         let layers = if self.layers > 0 { self.layers } else { self.levels().len() };
-        let volume: f64 = self.printing().map(|one| one.volume(filament)).sum();
+        let volume: f64 = self.printing_moves().map(|one| one.volume(filament)).sum();
         let mut lines = vec![format!(
             "the file prints {layers} {}, middle lines from {} to {}, {:.3} mm³ of {:.1} mm of filament, in \
              {}",
@@ -68,9 +68,11 @@ impl ToolPath {
         if shares.iter().any(|(name, _)| !name.is_empty()) {
             let name =
                 |name: &str| if name.is_empty() { "without a name".to_owned() } else { format!("`{name}`") };
-            let list =
-                shares.iter().take(LISTED).map(|(of, share)| format!("{} {:.1} %", name(of), 100.0 * share));
-            let more = shares.len().saturating_sub(LISTED);
+            let list = shares
+                .iter()
+                .take(MAX_LISTED)
+                .map(|(of, share)| format!("{} {:.1} %", name(of), 100.0 * share));
+            let more = shares.len().saturating_sub(MAX_LISTED);
             let more = if more > 0 { format!(", {more} more") } else { String::new() };
             lines.push(format!("by feature: {}{more}", list.collect::<Vec<_>>().join(", ")));
         }
@@ -79,7 +81,7 @@ impl ToolPath {
 
     /// Compares the duration, computed as described by `with`, with the slicer's estimate, if present. An
     /// estimate that differs by more than a twentieth comes with advice.
-    pub fn compared(&self, with: &str) -> Option<String> {
+    pub fn compare_estimate(&self, with: &str) -> Option<String> {
         let estimate = self.estimate?;
         let start = self.moves.get(self.first).map_or(0.0, |one| one.start);
         let own = self.duration() - start;

@@ -33,7 +33,7 @@ fn plate() -> (Mesh, ToolPath) {
 fn elements_appear_as_the_nozzle_passes() {
     let (mesh, path) = plate();
     let all: Vec<u32> = (0..400).collect();
-    let activation = path.activation(&mesh, &all, Bead { width: 5e-4, height: 2e-4 }).unwrap();
+    let activation = path.activation_times(&mesh, &all, Bead { width: 5e-4, height: 2e-4 }).unwrap();
     assert!(activation.missed.is_empty());
     let begin = path.moves.iter().find(|one| one.prints).unwrap().start;
     // a row lasts 1 s and the step to the next 0.05 s; centres lie at 0.25 mm, 0.75 mm, …
@@ -55,7 +55,7 @@ fn elements_appear_as_the_nozzle_passes() {
 }
 
 #[test]
-fn every_centre_is_found_that_a_search_of_all_finds() {
+fn activation_agrees_with_an_exhaustive_search() {
     // slanted, rising, standing and distant moves against a double loop over moves and elements
     let mesh = Grid::uniform([0.0; 3], [0.01, 0.007, 0.002], [23, 17, 5]).unwrap().mesh("plate").unwrap();
     let line = |from: [f64; 3], to: [f64; 3], start: f64| Move {
@@ -76,7 +76,7 @@ fn every_centre_is_found_that_a_search_of_all_finds() {
     let path = ToolPath { moves, ..ToolPath::default() };
     let bead = Bead { width: 1.3e-3, height: 5e-4 };
     let all: Vec<u32> = (0..mesh.element_count() as u32).collect();
-    let activation = path.activation(&mesh, &all, bead).unwrap();
+    let activation = path.activation_times(&mesh, &all, bead).unwrap();
     for element in all {
         let [x, y, z] = mesh.centre(element);
         let mut first = f64::INFINITY;
@@ -105,7 +105,7 @@ fn a_raster_fills_its_bar() {
     // ten lines of 1 s and nine steps of 0.05 s
     let path = ToolPath::raster(area, bead, 2, 0.01, 12.0).unwrap();
     assert_eq!(path.moves.len(), 20 + 19);
-    let activation = path.activation(&mesh, &all, bead).unwrap();
+    let activation = path.activation_times(&mesh, &all, bead).unwrap();
     assert!(activation.missed.is_empty());
     for (element, time) in activation.times.iter().enumerate() {
         let (column, row, layer) = (element % 20, element / 20 % 10, element / 200);
@@ -130,7 +130,7 @@ fn gaps_can_be_filled() {
         .map(|one| Move { prints: one.prints && one.to[0] > one.from[0] && one.to[2] < 3e-4, ..one })
         .collect();
     let path = ToolPath { moves, ..ToolPath::default() };
-    let mut activation = path.activation(&mesh, &all, Bead { width: 5e-4, height: 2e-4 }).unwrap();
+    let mut activation = path.activation_times(&mesh, &all, Bead { width: 5e-4, height: 2e-4 }).unwrap();
     assert_eq!(activation.missed.len(), 300);
     // the second layer was never printed
     assert_eq!(activation.fill(&mesh), 200);
@@ -164,13 +164,13 @@ fn codes_and_their_forms() {
     }
     assert_eq!(path.notes, ["commands not used: M117 (1)"]);
     assert_eq!(path.commands, [Command { time: 0.0, setting: Setting::Nozzle, value: 220.0 + 273.15 }]);
-    let moved = path.clone().shifted([1.0, 0.0, 0.0]);
+    let moved = path.clone().translated([1.0, 0.0, 0.0]);
     assert_eq!(moved.moves[0].from, [1.0, 0.0, 0.0]);
     assert_eq!(moved.duration(), path.duration());
 }
 
 #[test]
-fn what_is_wrong_is_named_with_its_line() {
+fn errors_name_the_line() {
     refused("G21\nG1 X1\n", &["a.gcode:2: velocity F: found \"0\""]);
     refused("G1 X1 F-5\n", &["a.gcode:1: velocity F: found \"-5\""]);
     refused(
@@ -186,17 +186,19 @@ fn what_is_wrong_is_named_with_its_line() {
     refused("G1 X1.2.3 F100\n", &["a.gcode:1: word: found \"X1.2.3 F100\""]);
     refused("G1 X?\n", &["a.gcode:1: word: found \"?\""]);
     let (mesh, path) = plate();
-    let text = |result: Result<Activation, Error>| result.unwrap_err().to_string();
+    let text = |result: Result<ActivationTimes, Error>| result.unwrap_err().to_string();
     assert!(
-        text(path.activation(&mesh, &[0], Bead { width: 0.0, height: 1.0 }))
+        text(path.activation_times(&mesh, &[0], Bead { width: 0.0, height: 1.0 }))
             .contains("width of the bead: found 0")
     );
     let bead = Bead { width: 5e-4, height: 2e-4 };
-    assert!(text(path.activation(&mesh, &[400], bead)).contains("element: found 400; allowed: below 400"));
-    assert!(text(ToolPath::default().activation(&mesh, &[0], bead)).contains("prints nothing"));
+    assert!(
+        text(path.activation_times(&mesh, &[400], bead)).contains("element: found 400; allowed: below 400")
+    );
+    assert!(text(ToolPath::default().activation_times(&mesh, &[0], bead)).contains("prints nothing"));
     let mut bad = path.clone();
     bad.moves[3].to[1] = f64::NAN;
-    assert!(text(bad.activation(&mesh, &[0], bead)).contains("move of the path: found NaN"));
+    assert!(text(bad.activation_times(&mesh, &[0], bead)).contains("move of the path: found NaN"));
 }
 
 #[test]
@@ -226,7 +228,7 @@ fn a_table_of_moves() {
 /// A path of two lines of 10 mm along x over a brick: one misses it by half of its length, the other
 /// entirely.
 #[test]
-fn where_a_path_lies() {
+fn fraction_outside_and_centring() {
     let (mesh, _) = plate();
     let all: Vec<u32> = (0..400).collect();
     let bead = Bead { width: 5e-4, height: 2e-4 };
@@ -240,15 +242,15 @@ fn where_a_path_lies() {
     };
     let path =
         ToolPath { moves: vec![line([0.005, 0.0025], 0.0), line([0.1, 0.0025], 1.0)], ..ToolPath::default() };
-    assert!((path.outside(&mesh, &all, bead) - 0.75).abs() < 1e-12);
+    assert!((path.fraction_outside(&mesh, &all, bead) - 0.75).abs() < 1e-12);
     assert_eq!(path.bounds(bead), Some([[0.005, 0.0025, 0.0], [0.11, 0.0025, 2e-4]]));
     // over the whole bed and one more: nothing above the brick, nothing below it
     for z in [-1e-3, 1e-2] {
-        assert_eq!(path.clone().shifted([0.0, 0.0, z]).outside(&mesh, &all, bead), 1.0);
+        assert_eq!(path.clone().translated([0.0, 0.0, z]).fraction_outside(&mesh, &all, bead), 1.0);
     }
     let one =
         ToolPath { moves: vec![line([0.1, 0.3], 0.0)], ..ToolPath::default() }.centred(&mesh, &all, bead);
-    assert!(one.outside(&mesh, &all, bead) == 0.0 && (one.moves[0].from[1] - 0.0025).abs() < 1e-15);
+    assert!(one.fraction_outside(&mesh, &all, bead) == 0.0 && (one.moves[0].from[1] - 0.0025).abs() < 1e-15);
     assert_eq!(ToolPath::default().bounds(bead), None);
 }
 
@@ -293,7 +295,7 @@ fn arcs_have_their_lengths() {
 /// at jerk speed.
 #[test]
 fn accelerations_take_their_time() {
-    let time = |text: &str| parsed(text).accelerated(0.5, 0.008).unwrap().duration();
+    let time = |text: &str| parsed(text).with_acceleration(0.5, 0.008).unwrap().duration();
     assert!((time("G1 X100 F3000\n") - (2.0 + 0.1)).abs() < 1e-12);
     assert!((time("G1 X2 F6000\n") - 2.0 * (0.002f64 / 0.5).sqrt()).abs() < 1e-12);
     // straight on as one move
@@ -304,10 +306,10 @@ fn accelerations_take_their_time() {
     let found = time("G1 X100 F3000\nG1 Y100\n");
     assert!((found - exact).abs() < 1e-12, "{found} {exact}");
     // a dwell keeps its duration, and the command after it shifts with it
-    let path = parsed("G1 X100 F3000\nG4 S3\nM104 S200\nG1 Y100\n").accelerated(0.5, 0.008).unwrap();
+    let path = parsed("G1 X100 F3000\nG4 S3\nM104 S200\nG1 Y100\n").with_acceleration(0.5, 0.008).unwrap();
     assert!((path.duration() - exact - 3.0).abs() < 1e-12);
     assert!((path.commands[0].time - path.moves[1].start).abs() < 1e-12);
-    assert!(parsed("G1 X1 F60\n").accelerated(0.0, 1.0).is_err());
+    assert!(parsed("G1 X1 F60\n").with_acceleration(0.0, 1.0).is_err());
 }
 
 /// Bead widths follow from filament; cube.gcode of the formulation: the first bead is 0.449985 mm wide.
@@ -315,7 +317,7 @@ fn accelerations_take_their_time() {
 fn beads_come_from_filament() {
     let path = parsed("M83\nG1 F600 Z0.25\nG1 X10 E0.4\nG1 Z0.5\nG1 X0 E0.4\nM106 S127.5\nG1 E-1\n");
     let area = 0.4 * std::f64::consts::PI * 1.75f64.powi(2) / 4.0 / 10.0;
-    let printed: Vec<&Move> = path.printing().collect();
+    let printed: Vec<&Move> = path.printing_moves().collect();
     assert!((1e6 * printed[0].area(1.75e-3) - area).abs() < 1e-12);
     assert!((path.fed() - 0.8e-3).abs() < 1e-15);
     let levels = path.levels();
@@ -354,7 +356,7 @@ fn files_of_slicers() {
         let path = read_gcode(&path).unwrap();
         assert!((1e3 * path.fed() - fed).abs() < 5e-5, "{file}: {}", path.fed());
         assert!((path.duration() - wait - even).abs() < 5.1e-3, "{file}: {}", path.duration());
-        let planned = path.clone().accelerated(0.5, 8e-3).unwrap();
+        let planned = path.clone().with_acceleration(0.5, 8e-3).unwrap();
         assert!((planned.duration() - wait - limited).abs() < 5.1e-3, "{file}: {}", planned.duration());
         assert!((path.setting(Setting::Bed)[0].1 - 273.15 - bed).abs() < 1e-9, "{file}");
     }

@@ -17,7 +17,8 @@ pub(super) fn corners(path: &Path, bytes: &[u8]) -> Result<Corners, Error> {
     let announced = bytes.get(80..84).and_then(|four| four.try_into().ok()).map(u32::from_le_bytes);
     let needed = announced.map(|count| 84 + 50 * u64::from(count)).filter(|needed| *needed > 84);
     if let Some(needed) = needed.filter(|needed| *needed <= bytes.len() as u64) {
-        let list: Vec<[f32; 3]> = bytes[84..needed as usize].chunks_exact(50).flat_map(of_triangle).collect();
+        let list: Vec<[f32; 3]> =
+            bytes[84..needed as usize].chunks_exact(50).flat_map(triangle_corners).collect();
         if let Some(wrong) = list.iter().position(|corner| corner.iter().any(|x| !x.is_finite())) {
             let found = format!("{:?} in triangle {}", list[wrong], wrong / 3 + 1);
             return Err(line_error(path, 1, "corner of a triangle", found, "finite numbers"));
@@ -43,7 +44,7 @@ pub(super) fn corners(path: &Path, bytes: &[u8]) -> Result<Corners, Error> {
 }
 
 /// Corners of a binary triangle, after its normal.
-fn of_triangle(bytes: &[u8]) -> [[f32; 3]; 3] {
+fn triangle_corners(bytes: &[u8]) -> [[f32; 3]; 3] {
     let number = |k: usize| bytes[4 * k..].first_chunk().map_or(f32::NAN, |four| f32::from_le_bytes(*four));
     [3, 6, 9].map(|k| [number(k), number(k + 1), number(k + 2)])
 }

@@ -10,14 +10,14 @@ use nalgebra::Vector3;
 
 /// Depth inside a shell's box, as a fraction of it, of the points that locate the shell: off the edges of
 /// other shells.
-const INWARDS: f64 = 1.37e-4;
+const INSET: f64 = 1.37e-4;
 
 /// Distance of corners to merge, over the largest extent.
-const WELD: f64 = 1e-6;
+const MERGE_DISTANCE: f64 = 1e-6;
 
 /// Limit on passes of splitting.
-const ROUNDS: usize = 30;
-const MOST_PAIRS: usize = 100_000_000;
+const MAX_SPLITS: usize = 30;
+const MAX_PAIRS: usize = 100_000_000;
 
 /// A shell: triangles connected by edges.
 pub(super) struct Shell {
@@ -27,11 +27,12 @@ pub(super) struct Shell {
     six: f64,
 }
 
-/// Merges points closer than [`WELD`]; returns the index of each after merging into the first of them.
+/// Merges points closer than [`MERGE_DISTANCE`]; returns the index of each after merging into the first of
+/// them.
 pub(super) fn weld(points: &[[f64; 3]]) -> Vec<u32> {
     let [low, high] = bounds(points.iter().copied());
     let size = (0..3).map(|d| high[d] - low[d]).fold(0.0, f64::max);
-    let near = WELD * size;
+    let near = MERGE_DISTANCE * size;
     if !(near > 0.0 && near.is_finite()) {
         return (0..points.len() as u32).collect();
     }
@@ -86,7 +87,7 @@ pub(super) fn shells(
         });
         let doubled = before - triangles.len();
         if doubled > 0 {
-            notes.push(format!("{doubled} triangles that are there twice are left out"));
+            notes.push(format!("{doubled} duplicate triangles are left out"));
             edges = self::edges(triangles);
         }
     }
@@ -143,17 +144,17 @@ fn is_closed(edges: &Edges) -> bool {
 /// Splits triangles at corners of others on their edges, where the surface is open; returns their number.
 fn split(points: &[[f64; 3]], triangles: &mut Vec<[u32; 3]>, edges: &mut Edges) -> usize {
     let [low, high] = bounds(points.iter().copied());
-    let near = WELD * (0..3).map(|d| high[d] - low[d]).fold(0.0, f64::max);
+    let near = MERGE_DISTANCE * (0..3).map(|d| high[d] - low[d]).fold(0.0, f64::max);
     let at = |n: u32| Vector3::from(points[n as usize]);
     let before = triangles.len();
-    for _ in 0..ROUNDS {
+    for _ in 0..MAX_SPLITS {
         let mut open: Vec<[u32; 2]> =
             edges.iter().filter(|(_, (count, _))| count[0] != count[1]).map(|(ends, _)| *ends).collect();
         open.sort_unstable();
         let mut corners = open.as_flattened().to_vec();
         corners.sort_unstable();
         corners.dedup();
-        if open.len() * corners.len() > MOST_PAIRS {
+        if open.len() * corners.len() > MAX_PAIRS {
             break;
         }
         let on = |&[p, q]: &[u32; 2]| {
@@ -263,7 +264,7 @@ fn extremes(shell: &Shell, points: &[[f64; 3]], triangles: &[[u32; 3]]) -> [[f64
         let at = corners().find(|at| at[d] == end[d]).unwrap_or(low);
         std::array::from_fn(|e| {
             let middle = 0.5 * (low[e] + high[e]);
-            at[e] + INWARDS * (1.0 + 0.3 * e as f64) * (middle - at[e])
+            at[e] + INSET * (1.0 + 0.3 * e as f64) * (middle - at[e])
         })
     })
 }

@@ -78,7 +78,7 @@ fn a_box_fills_its_cells() {
     assert_eq!(voxels.mesh.element_count(), 4 * 4 * 3);
     assert!((voxels.fill.iter().sum::<f64>() * 1.6e-10 / 6e-9 - 1.0).abs() < 1e-12);
     assert!((voxels.fill[3] - 0.75).abs() < 1e-6 && (voxels.fill[47] - 0.375).abs() < 1e-6);
-    assert!((voxels.ratio - 7.68 / 6.0).abs() < 1e-6 && !voxels.may_be_full());
+    assert!((voxels.ratio - 7.68 / 6.0).abs() < 1e-6 && !voxels.can_be_full());
 }
 
 #[test]
@@ -88,7 +88,7 @@ fn a_sphere_has_its_volume() {
     // chords of 90°/32
     assert!((stl.volume / exact - 1.0).abs() < 2e-3, "{}", stl.volume / exact);
     let full = stl.voxels([5e-4; 3], 0.5).unwrap().0;
-    assert!((full.ratio - 1.0).abs() < 0.01 && full.may_be_full(), "{}", full.ratio);
+    assert!((full.ratio - 1.0).abs() < 0.01 && full.can_be_full(), "{}", full.ratio);
     let parts = stl.voxels([1e-3; 3], 0.0).unwrap().0;
     assert!((parts.fill.iter().sum::<f64>() * 1e-9 / stl.volume - 1.0).abs() < 1e-12);
     // rays alone miss little of it
@@ -141,10 +141,10 @@ fn shells_are_united_as_slicers_do() {
         ("a common edge", vec![whole(true), shell([10.0, 10.0, 0.0], [20.0, 20.0, 10.0], true)], 2000.0, ""),
         ("a common corner", vec![whole(true), shell([10.0; 3], [20.0; 3], true)], 2000.0, "2 shells"),
         (
-            "a triangle there twice",
+            "a duplicate triangle",
             vec![whole(true), whole(true)[..1].to_vec()],
             1000.0,
-            "1 triangles that are",
+            "1 duplicate triangles",
         ),
         (
             "crossing bars",
@@ -304,7 +304,7 @@ fn damaged_files_are_errors_or_surfaces() {
 }
 
 #[test]
-fn what_is_wrong_is_named() {
+fn errors_name_the_defect() {
     let triangles = brick([3.0, 2.0, 1.0]);
     let refused = |bytes: &[u8], words: &[&str]| {
         let text = parsed(bytes).unwrap_err().to_string();

@@ -1,17 +1,17 @@
 //! Matrix-vector products: vectorized over runs of equal rows, row by row otherwise.
 
-use super::stencils::Stencil;
-use super::{Rows, Segment};
+use super::stencils::RowStencil;
+use super::{ConductionRows, RowRun};
 use crate::system::vector::dot_simd;
 use pulp::{Simd, WithSimd};
 
 /// Longest row of the vectorized path.
-const MOST_ENTRIES: usize = 64;
+const MAX_ENTRIES: usize = 64;
 
 /// Product of one work item.
-pub(super) struct Product<'a, const FLOW: bool> {
-    pub rows: &'a Rows,
-    pub segments: &'a [Segment],
+pub(super) struct RowsProduct<'a, const FLOW: bool> {
+    pub rows: &'a ConductionRows,
+    pub segments: &'a [RowRun],
     pub weights: [f64; 2],
     pub diagonal: Option<&'a [f64]>,
     pub x: &'a [f64],
@@ -19,7 +19,7 @@ pub(super) struct Product<'a, const FLOW: bool> {
     pub first: usize,
 }
 
-impl<const FLOW: bool> WithSimd for Product<'_, FLOW> {
+impl<const FLOW: bool> WithSimd for RowsProduct<'_, FLOW> {
     type Output = f64;
 
     #[inline(always)]
@@ -27,12 +27,12 @@ impl<const FLOW: bool> WithSimd for Product<'_, FLOW> {
         let Self { rows, segments, weights, diagonal, x, y, first } = self;
         let stencils = &rows.stencils;
         for segment in segments {
-            let Stencil { pattern, values } = segment.stencil;
+            let RowStencil { pattern, values } = segment.stencil;
             let (range, offsets) = (stencils.values.range(values), stencils.offsets(pattern));
             let start = first + segment.start as usize;
             let length = segment.length as usize;
-            if length >= S::F64_LANES && range.len() <= MOST_ENTRIES {
-                Runs { rows, segment, diagonal, y: &mut *y, first }.run::<S, FLOW>(simd, weights, x);
+            if length >= S::F64_LANES && range.len() <= MAX_ENTRIES {
+                RunProduct { rows, segment, diagonal, y: &mut *y, first }.run::<S, FLOW>(simd, weights, x);
             } else {
                 // vectors of four read one number past a row with columns in threes
                 let threes = stencils.in_threes(pattern)
@@ -101,9 +101,9 @@ fn flow(offsets: &[i32], values: &[f64], x: &[f64], row: usize) -> f64 {
 }
 
 /// Products K x and M u of one work item, in one pass over the rows.
-pub(super) struct Both<'a> {
-    pub rows: &'a Rows,
-    pub segments: &'a [Segment],
+pub(super) struct FlowAndCapacity<'a> {
+    pub rows: &'a ConductionRows,
+    pub segments: &'a [RowRun],
     pub x: &'a [f64],
     pub u: &'a [f64],
     pub flow: &'a mut [f64],
@@ -111,7 +111,7 @@ pub(super) struct Both<'a> {
     pub first: usize,
 }
 
-impl WithSimd for Both<'_> {
+impl WithSimd for FlowAndCapacity<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -119,12 +119,12 @@ impl WithSimd for Both<'_> {
         let Self { rows, segments, x, u, flow, stored, first } = self;
         let stencils = &rows.stencils;
         for segment in segments {
-            let Stencil { pattern, values } = segment.stencil;
+            let RowStencil { pattern, values } = segment.stencil;
             let (range, offsets) = (stencils.values.range(values), stencils.offsets(pattern));
             let start = first + segment.start as usize;
             let length = segment.length as usize;
-            if length >= S::F64_LANES && range.len() <= MOST_ENTRIES {
-                let rows_of = |y| Runs { rows, segment, diagonal: None, y, first };
+            if length >= S::F64_LANES && range.len() <= MAX_ENTRIES {
+                let rows_of = |y| RunProduct { rows, segment, diagonal: None, y, first };
                 rows_of(&mut *flow).run::<S, true>(simd, [0.0, 1.0], x);
                 rows_of(&mut *stored).run::<S, false>(simd, [1.0, 0.0], u);
                 continue;
@@ -157,21 +157,21 @@ impl WithSimd for Both<'_> {
 }
 
 /// Product of a run of equal rows.
-struct Runs<'a> {
-    rows: &'a Rows,
-    segment: &'a Segment,
+struct RunProduct<'a> {
+    rows: &'a ConductionRows,
+    segment: &'a RowRun,
     diagonal: Option<&'a [f64]>,
     y: &'a mut [f64],
     first: usize,
 }
 
-impl Runs<'_> {
+impl RunProduct<'_> {
     #[inline(always)]
     fn run<S: Simd, const FLOW: bool>(self, simd: S, weights: [f64; 2], x: &[f64]) {
         let Self { rows, segment, diagonal, y, first } = self;
         let lanes = S::F64_LANES;
         let range = rows.stencils.values.range(segment.stencil.values);
-        let mut values = [0.0; MOST_ENTRIES];
+        let mut values = [0.0; MAX_ENTRIES];
         let offsets = rows.stencils.offsets(segment.stencil.pattern);
         let values = &mut values[..offsets.len()];
         for (value, at) in values.iter_mut().zip(range) {

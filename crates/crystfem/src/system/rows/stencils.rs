@@ -7,12 +7,12 @@ use std::ops::Range;
 
 /// Stencil of a row: its list of offsets and its list of values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Stencil {
+pub(super) struct RowStencil {
     pub(super) pattern: u32,
     pub(super) values: u32,
 }
 
-impl Stencil {
+impl RowStencil {
     /// Marks a missing stencil.
     pub(super) const NONE: Self = Self { pattern: NONE, values: NONE };
 }
@@ -27,7 +27,7 @@ pub(super) struct Entries<'a> {
 
 /// Index of lists in flat arrays: their ranges, the number of rows of each, and a hash of their content.
 #[derive(Clone, Debug)]
-pub(super) struct Lists {
+pub(super) struct ListIndex {
     starts: Vec<u32>,
     rows: Vec<u32>,
     by_hash: HashMap<u64, u32>,
@@ -40,8 +40,8 @@ pub(super) struct Lists {
 /// Lists of offsets and of values.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Stencils {
-    pub(super) patterns: Lists,
-    pub(super) values: Lists,
+    pub(super) patterns: ListIndex,
+    pub(super) values: ListIndex,
     offsets: Vec<i32>,
     /// Position of the diagonal in each pattern, or [`NONE`].
     diagonal: Vec<u32>,
@@ -52,13 +52,13 @@ pub(super) struct Stencils {
     pub(super) capacity: Vec<f64>,
 }
 
-impl Default for Lists {
+impl Default for ListIndex {
     fn default() -> Self {
         Self { starts: vec![0], rows: Vec::new(), by_hash: HashMap::new(), used: 0, dead: 0 }
     }
 }
 
-impl Lists {
+impl ListIndex {
     pub(super) fn count(&self) -> usize {
         self.rows.len()
     }
@@ -103,7 +103,7 @@ impl Lists {
     }
 
     /// Counts rows that now use a list.
-    pub(super) fn hold(&mut self, list: u32, rows: u16) {
+    pub(super) fn add_rows(&mut self, list: u32, rows: u16) {
         if self.rows[list as usize] == 0 {
             self.used += 1;
             self.dead -= self.range(list).len();
@@ -112,7 +112,7 @@ impl Lists {
     }
 
     /// Counts rows that no longer use a list.
-    pub(super) fn release(&mut self, list: u32, rows: u16) {
+    pub(super) fn remove_rows(&mut self, list: u32, rows: u16) {
         self.rows[list as usize] -= u32::from(rows);
         if self.rows[list as usize] == 0 {
             self.used -= 1;
@@ -135,7 +135,7 @@ impl Stencils {
     }
 
     /// Index of the diagonal entry.
-    pub(super) fn diagonal(&self, stencil: Stencil) -> Option<usize> {
+    pub(super) fn diagonal(&self, stencil: RowStencil) -> Option<usize> {
         let at = self.diagonal[stencil.pattern as usize];
         (at != NONE).then_some(self.values.range(stencil.values).start + at as usize)
     }
@@ -151,7 +151,7 @@ impl Stencils {
             + values * size_of::<f64>()
     }
 
-    pub(super) fn entries(&self, stencil: Stencil) -> Entries<'_> {
+    pub(super) fn entries(&self, stencil: RowStencil) -> Entries<'_> {
         let range = self.values.range(stencil.values);
         Entries {
             offsets: self.offsets(stencil.pattern),
@@ -161,8 +161,8 @@ impl Stencils {
     }
 
     /// Finds or adds the stencil of these entries, with values shared or of the row's own.
-    pub(super) fn find_or_add(&mut self, entries: Entries, own: bool) -> Stencil {
-        Stencil { pattern: self.pattern(entries.offsets), values: self.list(entries, own) }
+    pub(super) fn find_or_add(&mut self, entries: Entries, own: bool) -> RowStencil {
+        RowStencil { pattern: self.pattern(entries.offsets), values: self.list(entries, own) }
     }
 
     /// Finds or adds the pattern of these offsets.

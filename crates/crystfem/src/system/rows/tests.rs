@@ -7,7 +7,7 @@ use super::*;
 fn a_line_has_few_stencils_and_the_right_product() {
     let size = 10_000;
     let values = |row: usize| if row == 5000 { [-2.0, 7.0, -3.0] } else { [-1.0, 2.5, -1.0] };
-    let mut rows = Rows::build(size, true, |row, out| {
+    let mut rows = ConductionRows::build(size, true, |row, out| {
         out.begin(std::iter::empty());
         let v = values(row);
         for (k, offset) in [-1_i32, 0, 1].into_iter().enumerate() {
@@ -64,12 +64,12 @@ fn rows_that_alternate_share_their_values() {
         })
     };
     let fill = |turn: usize| {
-        move |row: usize, out: &mut Row| {
+        move |row: usize, out: &mut RowBuilder| {
             out.begin([row as u32, turn as u32].into_iter());
             entries(row, turn).for_each(|(offset, value)| out.add(offset, value, 0.0));
         }
     };
-    let mut rows = Rows::build(size, false, fill(0));
+    let mut rows = ConductionRows::build(size, false, fill(0));
     assert!(rows.are_few() && (0..rows.items()).all(|item| rows.is_unequal(item)));
     let all: Vec<u32> = (0..size as u32).collect();
     for turn in 1..40 {

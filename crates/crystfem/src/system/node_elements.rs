@@ -9,13 +9,13 @@ use rayon::prelude::*;
 const BATCH: usize = 4096;
 
 /// Elements around each node of a mesh, ascending, as `stride` × element + local number of the node.
-pub struct Around {
+pub struct NodeElements {
     corners: Groups<u32>,
     /// Stride: 8, or 32 for a mesh with second-order elements.
     stride: u32,
 }
 
-impl Around {
+impl NodeElements {
     /// Collects all elements that ever exist.
     pub fn new(mesh: &Mesh, absent: &[u32]) -> Self {
         let stride = if mesh.is_second_order() { 32 } else { 8 };
@@ -29,7 +29,7 @@ impl Around {
     }
 
     /// Born elements of a node, with the local number of the node.
-    pub fn of(&self, node: u32, born: &[u32]) -> impl Iterator<Item = (u32, usize)> {
+    pub fn elements_of(&self, node: u32, born: &[u32]) -> impl Iterator<Item = (u32, usize)> {
         let stride = self.stride;
         self.corners
             .of(node as usize)
@@ -51,7 +51,7 @@ impl Around {
             (0..mesh.side_count(element)).map(move |side| Face { element, side }).filter(|&face| {
                 let corners = mesh.face_nodes(face);
                 corners.iter().any(|&node| wanted(node))
-                    && !self.of(corners[0], born).any(|(other, _)| {
+                    && !self.elements_of(corners[0], born).any(|(other, _)| {
                         let others = mesh.nodes(other);
                         other != face.element && corners[1..].iter().all(|corner| others.contains(corner))
                     })

@@ -1,6 +1,6 @@
 //! Comments of slicers: features, heights, layers, estimates, settings.
 
-use super::feature::BEFORE;
+use super::feature::BEFORE_FIRST_LAYER;
 use super::limits::Limits;
 
 /// Feature before any is named.
@@ -10,7 +10,7 @@ const PLACEHOLDER: f64 = 6666.0;
 
 /// State read from comments.
 #[derive(Debug)]
-pub(super) struct Remarks {
+pub(super) struct Comments {
     /// Names of features.
     pub features: Vec<String>,
     /// Current feature.
@@ -35,7 +35,7 @@ pub(super) struct Remarks {
     pub limits_ignored: bool,
 }
 
-impl Remarks {
+impl Comments {
     /// Returns the initial state; `marked` if the file marks its layers.
     pub fn new(marked: bool) -> Self {
         let mut new = Self {
@@ -52,7 +52,7 @@ impl Remarks {
             limits_ignored: false,
         };
         if marked {
-            new.name(BEFORE);
+            new.name(BEFORE_FIRST_LAYER);
         }
         new
     }

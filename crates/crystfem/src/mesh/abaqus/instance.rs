@@ -2,21 +2,21 @@
 
 use nalgebra::{Rotation3, Unit, Vector3};
 
-use super::cards::{Cards, Row};
+use super::cards::{Cards, DataLine};
 use crate::error::Error;
 
 /// Position of an instance: a translation, then a rotation about a line (Abaqus Keywords Guide, `*INSTANCE`).
 #[derive(Debug)]
-pub(super) struct Place {
+pub(super) struct InstancePosition {
     shift: Vector3<f64>,
     /// A point of the line, and the rotation about it.
     turn: Option<(Vector3<f64>, Rotation3<f64>)>,
 }
 
-impl Place {
+impl InstancePosition {
     /// Reads data lines: x, y, z; then two points of the line and an angle in degrees. `None` without any.
     pub fn read(cards: &mut Cards) -> Result<Option<Self>, Error> {
-        let numbers = |row: &Row, allowed: &str, count: usize| -> Result<Vec<f64>, Error> {
+        let numbers = |row: &DataLine, allowed: &str, count: usize| -> Result<Vec<f64>, Error> {
             let words = row.words();
             if words.len() > count {
                 return Err(row.error("place of an instance", row.text(), allowed));
@@ -39,7 +39,7 @@ impl Place {
     }
 
     /// Transforms a point of the part.
-    pub fn of(&self, point: [f64; 3]) -> [f64; 3] {
+    pub fn transform(&self, point: [f64; 3]) -> [f64; 3] {
         let moved = Vector3::from(point) + self.shift;
         self.turn.as_ref().map_or(moved, |(at, turn)| at + turn * (moved - at)).into()
     }

@@ -39,7 +39,7 @@ impl Mesh {
 
 #[cfg(test)]
 mod tests {
-    use crate::mesh::{Block, Grid, Split, quality};
+    use crate::mesh::{Block, CellSplit, Grid, quality};
 
     #[test]
     fn every_edge_has_one_node() {
@@ -49,9 +49,9 @@ mod tests {
         let edges = 3 * 9 + 2 * 4 * 3 + 2 * 4 * 3;
         let (x, y, z) = (4 * 4, 3 * 3 * 2, 3 * 3 * 2);
         for (split, more, left) in [
-            (Split::Hexahedra, 0, 9 + 12),
-            (Split::Wedges, 3 * 2 * 3, 9 + 12),
-            (Split::SixTetrahedra, x + y + z + 12, 9 + 12 + 4),
+            (CellSplit::Hexahedra, 0, 9 + 12),
+            (CellSplit::Wedges, 3 * 2 * 3, 9 + 12),
+            (CellSplit::SixTetrahedra, x + y + z + 12, 9 + 12 + 4),
         ] {
             let mesh = grid.blocks(&block, split).unwrap();
             let [nodes, elements] = [mesh.points.len(), mesh.element_count()];

@@ -1,7 +1,7 @@
 //! Motion planning of a machine with limited acceleration.
 
 use super::limits::{Limits, Ramp};
-use super::{Motion, ToolPath};
+use super::{MachineMotion, ToolPath};
 use crate::error::Error;
 use nalgebra::Vector3;
 
@@ -38,7 +38,7 @@ impl ToolPath {
     ///
     /// # Errors
     /// [`Error::Parameter`] for an acceleration or a jerk that is not positive.
-    pub fn accelerated(mut self, acceleration: f64, jerk: f64) -> Result<Self, Error> {
+    pub fn with_acceleration(mut self, acceleration: f64, jerk: f64) -> Result<Self, Error> {
         for (name, found) in [("acceleration", acceleration), ("jerk", jerk)] {
             if !(found > 0.0 && found.is_finite()) {
                 return Err(Error::Parameter { name, found, allowed: "positive and finite".into() });
@@ -67,7 +67,7 @@ impl ToolPath {
 
     /// Applies the limits stated in the file at each time, for feed-only motions too: velocity, acceleration
     /// and jerk of each axis, or junction deviation. Dwells are stops.
-    pub fn as_stated(mut self) -> Self {
+    pub fn with_stated_limits(mut self) -> Self {
         let mut last: Option<(Ramp, [f64; 4])> = None;
         let (mut ramps, mut kept): (Vec<Ramp>, Vec<usize>) = Default::default();
         for (k, motion) in self.motions.iter().enumerate() {
@@ -90,7 +90,7 @@ impl ToolPath {
 
     /// Describes the limits stated in the file in a line; `None` without limits of motion.
     pub fn describe_limits(&self) -> Option<String> {
-        let acts = |motion: &Motion| self.limits[motion.limits as usize].stated;
+        let acts = |motion: &MachineMotion| self.limits[motion.limits as usize].stated;
         let last = self.motions.iter().rfind(|motion| acts(motion))?;
         Some(self.limits[last.limits as usize].describe())
     }

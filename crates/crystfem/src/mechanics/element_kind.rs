@@ -1,13 +1,13 @@
 //! Element kinds of the mechanics.
 
-use super::element::{Hexahedron, Modal, POINTS, Six, Wide};
+use super::element::{ElementVector, GAUSS_POINTS, Hexahedron, ModalVector, VoigtVector};
 use super::tetrahedron::{self, Tetrahedron};
 
 /// Maximum number of nodes of an element.
-pub const MOST: usize = 10;
+pub const MAX_NODES_PER_ELEMENT: usize = 10;
 /// A hexahedron of 8 nodes, or a tetrahedron of 4 or 10.
 #[derive(Clone, Debug)]
-pub enum Element {
+pub enum MechanicalElement {
     /// Hexahedron of 8 nodes and 8 Gauss points.
     Hexahedron(Box<Hexahedron>),
     /// Tetrahedron of 4 nodes and 1 Gauss point, or of 10 and 4.
@@ -24,12 +24,12 @@ pub fn points(nodes: usize) -> usize {
     match nodes {
         4 => 1,
         10 => 4,
-        _ => POINTS,
+        _ => GAUSS_POINTS,
     }
 }
 
 /// Shape functions at a Gauss point of an element with `nodes` nodes.
-pub fn shares(nodes: usize, point: usize) -> [f64; MOST] {
+pub fn shares(nodes: usize, point: usize) -> [f64; MAX_NODES_PER_ELEMENT] {
     if nodes != 8 {
         return tetrahedron::shares(nodes, point);
     }
@@ -51,7 +51,7 @@ pub fn key(places: &[[f64; 3]]) -> Vec<i64> {
     edges.chain([(size * 1e15).round() as i64]).collect()
 }
 
-impl Element {
+impl MechanicalElement {
     /// Computes an element from 8, 4 or 10 node positions, m; `None` for other numbers, or if inverted.
     pub fn new(places: &[[f64; 3]], poisson: f64) -> Option<Self> {
         match places.len() {
@@ -78,7 +78,7 @@ impl Element {
     }
 
     /// Stress over the modulus, from an elastic strain.
-    pub fn stress(&self, strain: &Six) -> Six {
+    pub fn stress(&self, strain: &VoigtVector) -> VoigtVector {
         match self {
             Self::Hexahedron(own) => own.stress(strain),
             Self::Tetrahedron(own) => own.stress(strain),
@@ -86,20 +86,25 @@ impl Element {
     }
 
     /// Nodal and modal forces, see [`Hexahedron::forces`].
-    pub fn forces(&self, stresses: &[Six; POINTS]) -> (Wide, Modal) {
+    pub fn forces(&self, stresses: &[VoigtVector; GAUSS_POINTS]) -> (ElementVector, ModalVector) {
         match self {
             Self::Hexahedron(own) => {
                 let (nodal, modal) = own.forces(stresses);
-                let mut all = Wide::zeros();
+                let mut all = ElementVector::zeros();
                 all.fixed_rows_mut::<24>(0).copy_from(&nodal);
                 (all, modal)
             }
-            Self::Tetrahedron(own) => (own.forces(stresses), Modal::zeros()),
+            Self::Tetrahedron(own) => (own.forces(stresses), ModalVector::zeros()),
         }
     }
 
     /// Strain increments, see [`Hexahedron::strains`].
-    pub fn strains(&self, displacement: &Wide, modal: &Modal, modulus: f64) -> [Six; POINTS] {
+    pub fn strains(
+        &self,
+        displacement: &ElementVector,
+        modal: &ModalVector,
+        modulus: f64,
+    ) -> [VoigtVector; GAUSS_POINTS] {
         match self {
             Self::Hexahedron(own) => {
                 own.strains(&displacement.fixed_rows::<24>(0).into_owned(), modal, modulus)
@@ -109,7 +114,7 @@ impl Element {
     }
 
     /// Rotation at the centre by nodal displacements, half their curl, rad.
-    pub fn rotation(&self, displacement: &Wide) -> [f64; 3] {
+    pub fn rotation(&self, displacement: &ElementVector) -> [f64; 3] {
         match self {
             Self::Hexahedron(own) => own.rotation(&displacement.fixed_rows::<24>(0).into_owned()),
             Self::Tetrahedron(own) => own.rotation(displacement),
