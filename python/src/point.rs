@@ -2,12 +2,12 @@
 
 use crate::error::fault;
 use crate::watch::left_alone;
-use crystfem::fit::{Fit, Known, Run, nakamura};
-use crystfem::history::History;
-use crystfem::kinetics::{Constants, Kinetics};
-use crystfem::material::{Polymer, Property, Semicrystalline, ThermalMaterial};
+use crystfem::fit::{KineticFit, FixedConstants, Run, nakamura};
+use crystfem::history::TemperatureHistory;
+use crystfem::kinetics::{KineticConstants, Kinetics};
+use crystfem::material::{Polymer, ThermalProperty, Semicrystalline, ThermalMaterial};
 use crystfem::melting::Melting;
-use crystfem::point::{Course, Drive, Stepping};
+use crystfem::point::{PointProcess, Drive, Stepping};
 use numpy::{IntoPyArray, PyArray2, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -32,12 +32,12 @@ pub struct MaterialPointSpec {
 impl MaterialPointSpec {
     fn polymer(self) -> Result<Semicrystalline, crystfem::Error> {
         let property = |name: &'static str, (temperatures, values): (Vec<f64>, Vec<f64>)| match values[..] {
-            [value] if temperatures.is_empty() => Property::constant(name, value),
-            _ => Property::table(name, temperatures, values),
+            [value] if temperatures.is_empty() => ThermalProperty::constant(name, value),
+            _ => ThermalProperty::table(name, temperatures, values),
         };
         let [growth_rate, nucleation, activation_energy, equilibrium_melting, frozen, avrami_exponent] =
             self.kinetics;
-        let constants = Constants {
+        let constants = KineticConstants {
             growth_rate,
             nucleation,
             activation_energy,
@@ -72,9 +72,9 @@ pub fn course<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let solved = left_alone(py, move || {
         let material = material.polymer()?;
-        let drive = Drive::Prescribed(History::new(time, temperature)?);
+        let drive = Drive::Prescribed(TemperatureHistory::new(time, temperature)?);
         let stepping = Stepping::Adaptive { degree, kelvin };
-        let curves = Course { material: &material, drive, stepping }.run()?;
+        let curves = PointProcess { material: &material, drive, stepping }.run()?;
         Ok((curves, material.field_names()))
     })?;
     let (curves, names) = solved.map_err(|error: crystfem::Error| fault(&error))?;
@@ -99,7 +99,7 @@ pub fn fit_kinetics<'py>(
     known: [f64; 3],
 ) -> PyResult<Bound<'py, PyDict>> {
     let [equilibrium_melting, frozen, activation_energy] = known;
-    let known = Known { equilibrium_melting, frozen, activation_energy };
+    let known = FixedConstants { equilibrium_melting, frozen, activation_energy };
     let run = |[times, temperatures, degrees]: &[PyReadonlyArray1<'py, f64>; 3]| Run {
         times: times.as_array().to_vec(),
         temperatures: temperatures.as_array().to_vec(),
@@ -107,7 +107,7 @@ pub fn fit_kinetics<'py>(
         history: Vec::new(),
     };
     let runs: Vec<Run> = runs.iter().map(run).collect();
-    let Fit { estimates, draws, rms, measurements, evaluations, model } =
+    let KineticFit { estimates, draws, rms, measurements, evaluations, model } =
         left_alone(py, move || nakamura(&runs, &known))?.map_err(|error| fault(&error))?;
     let answer = PyDict::new(py);
     let rows: Vec<_> =

@@ -312,7 +312,7 @@ fn tables() {
         harness::output::csv::read(path).map(|_| ()).map_err(|error| error.to_string())
     });
     attack_files("history", &below("cases/ch4", ".csv"), "history.csv", |path| {
-        crystfem::history::History::read(path).map(|_| ()).map_err(|error| error.to_string())
+        crystfem::history::TemperatureHistory::read(path).map(|_| ()).map_err(|error| error.to_string())
     });
     let rubber = below("cases/ch1", ".csv");
     attack_files("rubber data", &rubber, "rubber.csv", |path| {

@@ -64,7 +64,7 @@ fn a_point_that_is_not_finite_ends_the_run() {
     assert!(scalar(&report(&here.join("asked")), "p.non_finite_rows") >= 1.0);
     run("fine", "temperature_step = \"0.01 K\"\n").with_code(0);
     let ended = run("none", "temperature_step = \"0.01 K\"\nnon_finite = true\n").with_code(1);
-    ended.tells("point `p`: all its values are finite");
+    ended.tells("point `p`: expected a non-finite value");
 }
 
 /// A wall 1 mm wide around a square of 20 mm, four layers of 0.5 mm, in the middle of a printer's bed.

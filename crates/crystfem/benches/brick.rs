@@ -4,8 +4,8 @@
 //! 80 °C; backward Euler.
 
 use crate::Failure;
-use crystfem::boundary::{Condition, Field, Schedule, Where};
-use crystfem::material::{Conductor, Property};
+use crystfem::boundary::{Condition, FaceSelection, Field, Schedule};
+use crystfem::material::{Conductor, ThermalProperty};
 use crystfem::mesh::{Grid, abaqus};
 use crystfem::problem::{Capacity, Problem};
 use crystfem::simulation::{LinearSolver, Settings, Simulation};
@@ -110,9 +110,9 @@ pub fn measure(options: &Options) -> Result<Vec<Measurement>, Failure> {
 fn problem(options: &Options) -> Result<Problem, crystfem::Error> {
     let mesh = Grid::uniform([0.0; 3], [EDGE; 3], [options.elements; 3])?.mesh("brick")?;
     let mesh = if options.distorted > 0.0 { mesh.distorted(options.distorted)? } else { mesh };
-    let property = Property::constant;
+    let property = ThermalProperty::constant;
     let material = Arc::new(Conductor::new(1010.0, property("k", 0.25)?, property("c", 2200.0)?)?);
-    let surface = || Where::Outer { except: mesh.surfaces["bottom"].clone() };
+    let surface = || FaceSelection::Outer { except: mesh.surfaces["bottom"].clone() };
     let ambient = || Schedule::constant(COLD);
     let conditions = vec![
         Condition::Temperature { nodes: mesh.node_sets["bottom"].clone(), value: Field::constant(COLD) },

@@ -2,7 +2,7 @@
 
 use crate::Failure;
 use crate::median;
-use crystfem::exact::cube::{Cube, END, Start};
+use crystfem::exact::cube::{Cube, CubeStart, END};
 use crystfem::simulation::{LinearSolver, Settings, Simulation};
 use crystfem::time::{Scheme, Steps};
 use evidence::measurement::Measurement;
@@ -20,7 +20,7 @@ const SOLVES: f64 = 1e-6;
 /// Rows `SCHEME-MODE LENGTH: QUANTITY, PROBLEM`.
 pub fn measure(elements: usize) -> Result<Vec<Measurement>, Failure> {
     let mut rows = Vec::new();
-    for (problem, start) in [("smooth", Start::Smooth), ("quenched", Start::Quenched)] {
+    for (problem, start) in [("smooth", CubeStart::Smooth), ("quenched", CubeStart::Quenched)] {
         let cube = Cube::new(elements, start);
         for (name, scheme) in [("backward-euler", Scheme::BackwardEuler), ("tr-bdf2", Scheme::TrBdf2)] {
             let fixed = STEPS.map(|count| {

@@ -4,7 +4,7 @@
 
 use crate::Failure;
 use crate::{REPEATS, median, point};
-use crystfem::kinetics::{Constants, Kinetics, Scheme, cooling_curve};
+use crystfem::kinetics::{KineticConstants, KineticScheme, Kinetics, cooling_curve};
 use crystfem::material::ThermalMaterial;
 use evidence::measurement::Measurement;
 use std::hint::black_box;
@@ -18,11 +18,11 @@ pub fn measure(rate: f64) -> Result<Vec<Measurement>, Failure> {
     if !(rate > 0.0 && rate.is_finite()) {
         return Err(format!("--rate: found {rate} K/min; allowed: above 0").into());
     }
-    let kinetics = Kinetics::new(Constants::TABLE_4_1_COLUMN_1)?;
+    let kinetics = Kinetics::new(KineticConstants::TABLE_4_1_COLUMN_1)?;
     let rate = rate / 60.0;
     let exact = cooling_curve(&kinetics, rate, 473.15, 393.15, 1e-3, 2);
     let mut rows = Vec::new();
-    for scheme in Scheme::ALL {
+    for scheme in KineticScheme::ALL {
         for kelvin in [0.001, 0.01, 0.1, 0.5, 1.0, 2.0, 5.0, 10.0] {
             let steps = (80.0_f64 / kelvin).round() as usize;
             let mut push = |what: &str, value: f64, unit: &str| {
@@ -69,7 +69,7 @@ fn response(latent_heat: Option<f64>, start: f64, increment: f64) -> Result<f64,
 
 fn error(
     kinetics: &Kinetics,
-    scheme: Scheme,
+    scheme: KineticScheme,
     rate: f64,
     kelvin: f64,
     steps: usize,
@@ -90,7 +90,7 @@ fn error(
 }
 
 /// The curve again and again, α at the end of each step included.
-fn nanoseconds(kinetics: &Kinetics, scheme: Scheme, rate: f64, kelvin: f64, steps: usize) -> f64 {
+fn nanoseconds(kinetics: &Kinetics, scheme: KineticScheme, rate: f64, kelvin: f64, steps: usize) -> f64 {
     let repeats = (STEPS / steps).max(1);
     let times: Vec<f64> = (0..REPEATS)
         .map(|_| {

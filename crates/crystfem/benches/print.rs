@@ -5,9 +5,9 @@
 
 use crate::Failure;
 use crate::brick::peak_memory;
-use crystfem::boundary::{Condition, Schedule, Where};
-use crystfem::kinetics::{Constants, Kinetics};
-use crystfem::material::{Filled, Polymer, Property, Semicrystalline, ThermalMaterial};
+use crystfem::boundary::{Condition, FaceSelection, Schedule};
+use crystfem::kinetics::{KineticConstants, Kinetics};
+use crystfem::material::{Filled, Polymer, Semicrystalline, ThermalMaterial, ThermalProperty};
 use crystfem::melting::Melting;
 use crystfem::mesh::Grid;
 use crystfem::problem::{Birth, Problem};
@@ -115,9 +115,9 @@ fn problem(options: &Options) -> Result<Problem, crystfem::Error> {
         Grid::uniform([0.0; 3], [side, side, EDGE * layers as f64], [count, count, layers])?.mesh("block")?;
     let whole: Arc<dyn ThermalMaterial> = Arc::new(Semicrystalline::new(Polymer {
         density: 1010.0,
-        conductivity: Property::constant("k", 0.25)?,
-        specific_heat: Property::constant("c", 2200.0)?,
-        kinetics: Kinetics::new(Constants::TABLE_4_1_COLUMN_1)?,
+        conductivity: ThermalProperty::constant("k", 0.25)?,
+        specific_heat: ThermalProperty::constant("c", 2200.0)?,
+        kinetics: Kinetics::new(KineticConstants::TABLE_4_1_COLUMN_1)?,
         melting: Some(Melting::PA12),
         ultimate_crystallinity: 0.25,
         latent_heat: options.latent.then_some(209e3),
@@ -157,8 +157,8 @@ fn problem(options: &Options) -> Result<Problem, crystfem::Error> {
         ambient: Schedule::constant(cold),
     };
     let bottom = mesh.surfaces["bottom"].clone();
-    let outer = Where::Outer { except: bottom.clone() };
-    let conditions = vec![film(Where::Faces(bottom), 300.0), film(outer, 15.0)];
+    let outer = FaceSelection::Outer { except: bottom.clone() };
+    let conditions = vec![film(FaceSelection::Faces(bottom), 300.0), film(outer, 15.0)];
     let material_of = (0..mesh.element_count()).map(of).collect();
     Ok(Problem { conditions, births, materials, material_of, ..Problem::new(mesh, whole, cold) })
 }

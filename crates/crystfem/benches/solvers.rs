@@ -1,7 +1,7 @@
 //! Error against run time of the linear solvers, in short and long steps.
 
 use crate::Failure;
-use crystfem::exact::cube::{Cube, Start};
+use crystfem::exact::cube::{Cube, CubeStart};
 use crystfem::simulation::{LinearSolver, Settings, Simulation};
 use evidence::measurement::Measurement;
 use std::time::Instant;
@@ -14,7 +14,7 @@ const TOLERANCES: [f64; 5] = [1e-1, 1e-3, 1e-5, 1e-7, 1e-9];
 
 /// Rows `SOLVER TOLERANCE: QUANTITY, LENGTH`; factors have the tolerance 0.
 pub fn measure(elements: usize) -> Result<Vec<Measurement>, Failure> {
-    let cube = Cube::new(elements, Start::Quenched);
+    let cube = Cube::new(elements, CubeStart::Quenched);
     let mut rows = Vec::new();
     for dt in LENGTHS {
         for tolerance in TOLERANCES {

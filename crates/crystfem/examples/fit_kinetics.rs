@@ -1,15 +1,15 @@
 //! Kinetics of Hoffman and Lauritzen fitted to cooling runs, which are computed here with known constants.
 
-use crystfem::fit::{Fit, Known, Run, nakamura};
-use crystfem::kinetics::{Constants, Kinetics, cooling_curve};
+use crystfem::fit::{FixedConstants, KineticFit, Run, nakamura};
+use crystfem::kinetics::{KineticConstants, Kinetics, cooling_curve};
 
 /// Constants that made the runs.
-pub const TRUTH: Constants = Constants::TABLE_4_1_COLUMN_1;
+pub const TRUTH: KineticConstants = KineticConstants::TABLE_4_1_COLUMN_1;
 
 /// Runs at 1, 5 and 20 K/min with a value every hundredth of α, fitted.
-pub fn fitted() -> Result<Fit, crystfem::Error> {
-    let Constants { equilibrium_melting, frozen, activation_energy, .. } = TRUTH;
-    let known = Known { equilibrium_melting, frozen, activation_energy };
+pub fn fitted() -> Result<KineticFit, crystfem::Error> {
+    let KineticConstants { equilibrium_melting, frozen, activation_energy, .. } = TRUTH;
+    let known = FixedConstants { equilibrium_melting, frozen, activation_energy };
     let kinetics = Kinetics::new(TRUTH)?;
     let mut runs = Vec::new();
     for rate in [1.0 / 60.0, 5.0 / 60.0, 20.0 / 60.0] {

@@ -1,7 +1,7 @@
 //! A block printed by G-code: the cells that its beads fill appear along its moves; temperature and crystallinity near its top.
 
 use crystfem::material::Semicrystalline;
-use crystfem::mesh::path::{Cells, parse};
+use crystfem::mesh::path::{CellSettings, parse};
 use crystfem::printed::PrintedPart;
 use crystfem::simulation::{Settings, Simulation};
 use std::path::Path;
@@ -21,7 +21,7 @@ fn gcode() -> String {
 pub fn printed(later: f64) -> Result<Simulation, crystfem::Error> {
     let path = parse(Path::new("block.gcode"), gcode().as_bytes())?;
     let end = path.duration();
-    let cells = Cells::new([1e-3, 1e-3, 0.25e-3]);
+    let cells = CellSettings::new([1e-3, 1e-3, 0.25e-3]);
     let part = PrintedPart::along(path, &cells, Semicrystalline::pa12()?)?;
     let mut simulation =
         part.hold("bottom", 373.15).convection(15.0, 353.15).simulate(Settings::adaptive(1e-3))?;

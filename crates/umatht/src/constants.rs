@@ -1,7 +1,7 @@
 //! Constants of the material in the order of hosts.
 
 use crystfem::kinetics::{self, Kinetics};
-use crystfem::material::{CONSTANT_NAMES, Polymer, Property, Semicrystalline};
+use crystfem::material::{CONSTANT_NAMES, Polymer, ThermalProperty, Semicrystalline};
 use crystfem::melting::Melting;
 use std::cell::RefCell;
 
@@ -84,8 +84,8 @@ impl HostMaterial {
         };
         let pa12 = Some(Melting::PA12);
         let (kinetics, melting) = match (column, rest) {
-            (1.0, _) => (kinetics::Constants::TABLE_4_1_COLUMN_1, pa12),
-            (2.0, _) => (kinetics::Constants::TABLE_4_1_COLUMN_2, pa12),
+            (1.0, _) => (kinetics::KineticConstants::TABLE_4_1_COLUMN_1, pa12),
+            (2.0, _) => (kinetics::KineticConstants::TABLE_4_1_COLUMN_2, pa12),
             (
                 0.0,
                 &[
@@ -102,7 +102,7 @@ impl HostMaterial {
                     peak,
                 ],
             ) => {
-                let own = kinetics::Constants {
+                let own = kinetics::KineticConstants {
                     growth_rate,
                     nucleation,
                     activation_energy,
@@ -130,8 +130,8 @@ impl HostMaterial {
         let material = Semicrystalline::new(Polymer {
             // the host has its own
             density: 1.0,
-            conductivity: Property::Constant(conductivity),
-            specific_heat: Property::Constant(specific_heat),
+            conductivity: ThermalProperty::Constant(conductivity),
+            specific_heat: ThermalProperty::Constant(specific_heat),
             kinetics: Kinetics::new(kinetics)?,
             melting,
             // α alone: the host gives ΔH·X∞

@@ -24,7 +24,7 @@ mod host;
 pub use constants::{Error, NAMES};
 
 use constants::HostMaterial;
-use crystfem::material::{Point, ThermalMaterial};
+use crystfem::material::{PointInput, ThermalMaterial};
 use nalgebra::Vector3;
 
 /// Increment at an integration point, in the units of the host: time in s, temperature from its own zero.
@@ -90,7 +90,7 @@ fn answer(constants: &HostMaterial, at: &ThermalIncrement, state: &State) -> Res
         }
     }
     let point =
-        Point { temperature: start, increment: end - start, gradient: at.gradient.into(), dt: at.time };
+        PointInput { temperature: start, increment: end - start, gradient: at.gradient.into(), dt: at.time };
     let (old, mut new) = ([state.z], [0.0]);
     let response = material.respond(&point, &old, &mut new)?;
     let mut fields = [0.0; 2];

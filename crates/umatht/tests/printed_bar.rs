@@ -1,7 +1,7 @@
 //! A bar printed layer by layer in CalculiX with the material of this crate, and in `crystfem`: node by node.
 
-use crystfem::kinetics::{Constants, Kinetics};
-use crystfem::material::{Polymer, Property, Semicrystalline};
+use crystfem::kinetics::{KineticConstants, Kinetics};
+use crystfem::material::{Polymer, ThermalProperty, Semicrystalline};
 use crystfem::melting::Melting;
 use crystfem::mesh::{Bar, HEXAHEDRON_SIDES, Mesh};
 use crystfem::printed::PrintedPart;
@@ -30,9 +30,9 @@ fn bar() -> Bar {
 fn ours(latent: bool) -> Vec<Vec<Option<f64>>> {
     let material = Semicrystalline::new(Polymer {
         density: 1010.0,
-        conductivity: Property::Constant(0.25),
-        specific_heat: Property::Constant(2200.0),
-        kinetics: Kinetics::new(Constants::TABLE_4_1_COLUMN_1).unwrap(),
+        conductivity: ThermalProperty::Constant(0.25),
+        specific_heat: ThermalProperty::Constant(2200.0),
+        kinetics: Kinetics::new(KineticConstants::TABLE_4_1_COLUMN_1).unwrap(),
         melting: Some(Melting::PA12),
         ultimate_crystallinity: 0.25,
         latent_heat: latent.then_some(LATENT / 0.25),

@@ -1,25 +1,25 @@
-//! A material that fills a part of its elements.
+//! A material that fills a fraction of its elements.
 
-use super::{Crystallization, Point, Response, ThermalMaterial};
+use super::{Crystallization, PointInput, ThermalMaterial, ThermalResponse};
 use crate::error::Error;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// A material of which an element holds only a part, spread evenly over it: ρ and k are that part of the material's, and
-/// energies and states per mass are the material's own (rule of mixtures with air that neither stores nor conducts).
+/// A material that fills a fraction of its elements, spread evenly: ρ and k are scaled by the fraction;
+/// energies and states per mass are unchanged (rule of mixtures with air that neither stores nor conducts).
 #[derive(Clone)]
 pub struct Filled {
-    /// The material.
+    /// Filling material.
     of: Arc<dyn ThermalMaterial>,
-    /// The part that is filled; above 1 where more was pressed in.
+    /// Filled fraction; above 1 for overfilled elements.
     fill: f64,
 }
 
 impl Filled {
-    /// A material and the part of the elements' volume that it fills.
+    /// Returns a material that fills a fraction of its elements.
     ///
     /// # Errors
-    /// A part that is not positive.
+    /// [`Error::Parameter`] for a fraction that is not above 0 and finite.
     pub fn new(of: Arc<dyn ThermalMaterial>, fill: f64) -> Result<Self, Error> {
         if fill > 0.0 && fill.is_finite() {
             return Ok(Self { of, fill });
@@ -28,11 +28,11 @@ impl Filled {
     }
 }
 
-/// Replaces materials by [`Filled`] ones, one for each material and filled part that elements have: `part_of` is the index
-/// of each element among `parts`.
+/// Replaces materials by [`Filled`] ones, one for each pair of material and fraction in use; `part_of` is the
+/// index of each element in the fractions `parts`.
 ///
 /// # Errors
-/// Those of [`Filled::new`]; more than 65536 of them.
+/// Errors of [`Filled::new`]; [`Error::Parameter`] for more than 65536 materials.
 pub fn fill_elements(
     materials: &mut Vec<Arc<dyn ThermalMaterial>>,
     material_of: &mut [u16],
@@ -110,9 +110,9 @@ impl ThermalMaterial for Filled {
         Some(&self.of)
     }
 
-    fn respond(&self, at: &Point, old: &[f64], new: &mut [f64]) -> Result<Response, Error> {
+    fn respond(&self, at: &PointInput, old: &[f64], new: &mut [f64]) -> Result<ThermalResponse, Error> {
         let own = self.of.respond(at, old, new)?;
-        Ok(Response {
+        Ok(ThermalResponse {
             flux: self.fill * own.flux,
             d_flux_d_temperature: self.fill * own.d_flux_d_temperature,
             d_flux_d_gradient: self.fill * own.d_flux_d_gradient,

@@ -1,7 +1,7 @@
 //! Births conserve energy, and lumped capacity never overshoots.
 
 use crate::bodies::{PA12, conductor, everywhere, film, grid, held, pa12, radiation, run};
-use crystfem::boundary::{Field, Where};
+use crystfem::boundary::{FaceSelection, Field};
 use crystfem::problem::{Birth, Capacity, Problem};
 use crystfem::simulation::{Settings, Simulation};
 use crystfem::time::Scheme;
@@ -11,12 +11,12 @@ const COLD: f64 = 353.15;
 
 /// Four layers of one element on a block of glass, one every 8 s, with film and radiation on the outer surface and
 /// the bottom held.
-fn printing(latent_heat: Option<f64>, elements: usize) -> Problem {
+fn printing_moves(latent_heat: Option<f64>, elements: usize) -> Problem {
     let (layers, glass) = (4, 3);
     let mesh = grid([4e-3, 2e-3, 3.5e-3], [2 * elements, elements, layers + glass]);
     let plane = 2 * elements * elements;
     let bottom = mesh.surfaces["bottom"].clone();
-    let surface = || Where::Outer { except: bottom.clone() };
+    let surface = || FaceSelection::Outer { except: bottom.clone() };
     let births = (0..layers)
         .map(|layer| Birth {
             time: 8.0 * layer as f64,
@@ -41,7 +41,7 @@ fn printing(latent_heat: Option<f64>, elements: usize) -> Problem {
 fn a_printed_bar_balances_its_energy() {
     for scheme in [Scheme::BackwardEuler, Scheme::TrBdf2] {
         for latent_heat in [None, Some(209e3)] {
-            let problem = printing(latent_heat, 2);
+            let problem = printing_moves(latent_heat, 2);
             let settings = Settings { scheme, ..Settings::adaptive(0.01) };
             let mut simulation = Simulation::new(problem, settings).unwrap();
             let steps = run(&mut simulation, 40.0);
@@ -119,7 +119,7 @@ fn overshoot_at_birth() {
 /// is taken from both.
 #[test]
 fn birth_on_crystals_melts_them_and_balances() {
-    let problem = printing(Some(209e3), 1);
+    let problem = printing_moves(Some(209e3), 1);
     let mut simulation = Simulation::new(problem, Settings::adaptive(0.01)).unwrap();
     run(&mut simulation, 8.0);
     let before = simulation.state().clone();

@@ -3,7 +3,7 @@
 //! 476.763087 K (printed to 1e-3 K).
 
 use crate::bodies::{PA12, conductor, film, grid, held, radiation, run};
-use crystfem::boundary::{Field, Where};
+use crystfem::boundary::{FaceSelection, Field};
 use crystfem::mesh::Mesh;
 use crystfem::problem::{Capacity, Problem};
 use crystfem::simulation::{Settings, Simulation};
@@ -14,7 +14,7 @@ fn brick(elements: usize, capacity: Capacity) -> Simulation {
 
 fn brick_of(mesh: Mesh, capacity: Capacity) -> Simulation {
     let bottom = mesh.surfaces["bottom"].clone();
-    let surface = || Where::Outer { except: bottom.clone() };
+    let surface = || FaceSelection::Outer { except: bottom.clone() };
     let conditions = vec![
         held(&mesh, "bottom", Field::constant(353.15)),
         film(surface(), 15.0, 353.15),

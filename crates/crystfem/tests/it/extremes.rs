@@ -1,7 +1,7 @@
 //! Stiff and extreme problems: never NaN, and the balance of energy holds.
 
 use crate::bodies::{PA12, conductor, everywhere, film, grid, held, pa12, radiation, run};
-use crystfem::boundary::{Field, Source};
+use crystfem::boundary::{Field, HeatSource};
 use crystfem::exact::Wall;
 use crystfem::mesh::Mesh;
 use crystfem::problem::Problem;
@@ -49,7 +49,7 @@ fn biot_numbers() {
     for exponent in [-6, -3, 0, 3, 6] {
         let biot = 10.0_f64.powi(exponent);
         let mesh = grid([length, 2e-4, 2e-4], [25, 1, 1]);
-        let surface = crystfem::boundary::Where::Faces(mesh.surfaces["right"].clone());
+        let surface = crystfem::boundary::FaceSelection::Faces(mesh.surfaces["right"].clone());
         let problem = Problem {
             conditions: vec![film(surface, biot * PA12[0] / length, 353.15)],
             ..Problem::new(mesh, conductor(PA12), 493.15)
@@ -130,7 +130,7 @@ fn one_element() {
     for mesh in [grid([1e-3; 3], [1; 3]), tetrahedron] {
         for settings in [Settings::adaptive(1.0), Settings::backward_euler(1e9)] {
             let problem = Problem {
-                sources: vec![Source { elements: vec![0], power: Field::constant(1e-4) }],
+                sources: vec![HeatSource { elements: vec![0], power: Field::constant(1e-4) }],
                 ..Problem::new(mesh.clone(), conductor(PA12), 300.0)
             };
             let mut simulation = Simulation::new(problem, settings).unwrap();
@@ -190,7 +190,7 @@ fn refusals() {
     assert!(message(good.clone(), Settings::backward_euler(0.0)).contains("time step"));
     assert!(message(good.clone(), Settings::backward_euler(f64::NAN)).contains("time step"));
     assert!(message(good.clone(), Settings { tolerance: -1.0, ..euler }).contains("tolerance"));
-    let source = Source { elements: vec![8], power: Field::constant(1.0) };
+    let source = HeatSource { elements: vec![8], power: Field::constant(1.0) };
     assert!(message(Problem { sources: vec![source], ..good.clone() }, euler).contains("element 8"));
     let mut simulation = Simulation::new(good, euler).unwrap();
     run(&mut simulation, 1.0);

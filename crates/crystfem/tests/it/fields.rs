@@ -1,7 +1,7 @@
 //! Crystallinity in bodies.
 
 use crate::bodies::{PA12, conductor, film, grid, pa12, run};
-use crystfem::boundary::{Condition, Field, Schedule, Where};
+use crystfem::boundary::{Condition, FaceSelection, Field, Schedule};
 use crystfem::problem::{Capacity, Problem};
 use crystfem::simulation::{Settings, Simulation};
 
@@ -13,7 +13,7 @@ fn crystallinity_of_half_a_body() {
         [(Capacity::Lumped, None), (Capacity::Lumped, Some(209e3)), (Capacity::Consistent, Some(209e3))]
     {
         let mesh = grid([4e-4, 1e-4, 1e-4], [4, 1, 1]);
-        let conditions = vec![film(Where::Outer { except: Vec::new() }, 2.0, 293.15)];
+        let conditions = vec![film(FaceSelection::Outer { except: Vec::new() }, 2.0, 293.15)];
         let problem = Problem {
             materials: vec![conductor(PA12), pa12(latent_heat)],
             material_of: vec![0, 0, 1, 1],

@@ -2,9 +2,9 @@
 //! the same as point by point, old beside new.
 
 use crate::bodies::{PA12, conductor, film, grid, pa12, run};
-use crystfem::boundary::Where;
+use crystfem::boundary::FaceSelection;
 use crystfem::error::Error;
-use crystfem::material::{Filled, Point, Response, ThermalMaterial};
+use crystfem::material::{Filled, PointInput, ThermalMaterial, ThermalResponse};
 use crystfem::problem::{Birth, Problem};
 use crystfem::simulation::{Settings, Simulation, State};
 use std::sync::Arc;
@@ -37,7 +37,7 @@ impl ThermalMaterial for PointByPoint {
     fn constant_conductivity(&self) -> bool {
         self.0.constant_conductivity()
     }
-    fn respond(&self, at: &Point, old: &[f64], new: &mut [f64]) -> Result<Response, Error> {
+    fn respond(&self, at: &PointInput, old: &[f64], new: &mut [f64]) -> Result<ThermalResponse, Error> {
         self.0.respond(at, old, new)
     }
 }
@@ -70,7 +70,7 @@ fn path(latent: bool, of: impl Fn(Arc<dyn ThermalMaterial>) -> Arc<dyn ThermalMa
     Problem {
         materials: vec![of(pa12(None)), of(half), of(third), conductor(PA12)],
         material_of: (0..layers * plane).map(material_of).collect(),
-        conditions: vec![film(Where::Outer { except: Vec::new() }, 50.0, 353.15)],
+        conditions: vec![film(FaceSelection::Outer { except: Vec::new() }, 50.0, 353.15)],
         births,
         ..Problem::new(mesh, conductor(PA12), 400.0)
     }
@@ -82,7 +82,7 @@ fn bits(state: &State) -> Vec<u64> {
 }
 
 #[test]
-fn rows_are_points() {
+fn rows_agree_with_single_points() {
     for (latent, settings, kelvin) in [
         (false, Settings::backward_euler(0.02), 0.0),
         (true, Settings::backward_euler(0.02), 1e-9),
@@ -187,13 +187,13 @@ fn unequal_cells_need_little_more_than_equal_ones() {
             birth.time = 0.5 * k as f64;
         }
         let bottom = mesh.surfaces["bottom"].clone();
-        let outer = Where::Outer { except: bottom.clone() };
+        let outer = FaceSelection::Outer { except: bottom.clone() };
         let problem = Arc::new(Problem {
             materials: (1..=fills).map(|k| filled(k) as Arc<dyn ThermalMaterial>).collect(),
             material_of: (0..mesh.element_count())
                 .map(|e| ((e as u64 * 2_654_435_761) >> 16) as u16 % fills)
                 .collect(),
-            conditions: vec![film(Where::Faces(bottom), 300.0, 353.15), film(outer, 15.0, 353.15)],
+            conditions: vec![film(FaceSelection::Faces(bottom), 300.0, 353.15), film(outer, 15.0, 353.15)],
             births,
             ..Problem::new(mesh, pa12(None), 353.15)
         });

@@ -1,9 +1,9 @@
 //! Observed orders of convergence with the manufactured solution of formulation.md.
 
 use crate::bodies::{PA12, conductor, grid, run};
-use crystfem::boundary::{Field, Source};
+use crystfem::boundary::{Field, HeatSource};
 use crystfem::exact::Manufactured;
-use crystfem::mesh::{Block, Grid, Mesh, Split};
+use crystfem::mesh::{Block, CellSplit, Grid, Mesh};
 use crystfem::problem::{Capacity, Problem};
 use crystfem::simulation::{Settings, Simulation};
 use crystfem::time::{Scheme, Steps};
@@ -21,7 +21,7 @@ fn simulation(mesh: Mesh, capacity: Capacity, scheme: Scheme, dt: f64) -> Simula
     let elements = (0..mesh.element_count() as u32).collect();
     let problem = Problem {
         initial: Field::function(|x, _| EXACT.temperature(x, 0.0)),
-        sources: vec![Source { elements, power: Field::function(|x, t| EXACT.source(x, t)) }],
+        sources: vec![HeatSource { elements, power: Field::function(|x, t| EXACT.source(x, t)) }],
         capacity,
         ..Problem::new(mesh, conductor(PA12), 0.0)
     };
@@ -29,7 +29,7 @@ fn simulation(mesh: Mesh, capacity: Capacity, scheme: Scheme, dt: f64) -> Simula
     Simulation::new(problem, settings).unwrap()
 }
 
-fn mesh(elements: usize, split: Split, distortion: f64) -> Mesh {
+fn mesh(elements: usize, split: CellSplit, distortion: f64) -> Mesh {
     let block = Block { name: "all".into(), lower: [0.0; 3], upper: [EXACT.length; 3] };
     let grid = Grid::uniform([0.0; 3], [EXACT.length; 3], [elements; 3]).unwrap();
     grid.blocks(&[block], split).unwrap().distorted(distortion).unwrap()
@@ -48,11 +48,11 @@ fn error(simulation: &Simulation) -> f64 {
 #[test]
 fn order_two_in_space() {
     for (split, distortion) in [
-        (Split::Hexahedra, 0.0),
-        (Split::Hexahedra, 0.1),
-        (Split::SixTetrahedra, 0.0),
-        (Split::SixTetrahedra, 0.1),
-        (Split::Wedges, 0.1),
+        (CellSplit::Hexahedra, 0.0),
+        (CellSplit::Hexahedra, 0.1),
+        (CellSplit::SixTetrahedra, 0.0),
+        (CellSplit::SixTetrahedra, 0.1),
+        (CellSplit::Wedges, 0.1),
     ] {
         for capacity in [Capacity::Lumped, Capacity::Consistent] {
             let errors = [4, 8, 16].map(|elements| {
@@ -75,9 +75,12 @@ fn order_two_in_space() {
 /// Second-order elements: three in L2 (Strang & Fix, 1973), here at the nodes, of any shape.
 #[test]
 fn order_three_in_space_of_second_order_elements() {
-    for (split, distortion) in
-        [(Split::Hexahedra, 0.0), (Split::Hexahedra, 0.1), (Split::SixTetrahedra, 0.1), (Split::Wedges, 0.1)]
-    {
+    for (split, distortion) in [
+        (CellSplit::Hexahedra, 0.0),
+        (CellSplit::Hexahedra, 0.1),
+        (CellSplit::SixTetrahedra, 0.1),
+        (CellSplit::Wedges, 0.1),
+    ] {
         let errors = [6, 8].map(|elements| {
             let mesh = mesh(elements, split, distortion).second_order();
             let mut simulation = simulation(mesh, Capacity::Consistent, Scheme::TrBdf2, 0.05);

@@ -1,8 +1,8 @@
 //! Patch tests: a linear field is exact on any mesh.
 
 use crate::bodies::{PA12, conductor, run};
-use crystfem::boundary::{Condition, Field, Where};
-use crystfem::mesh::{BOX_SIDES, Block, Grid, Split};
+use crystfem::boundary::{Condition, FaceSelection, Field};
+use crystfem::mesh::{BOX_SIDES, Block, CellSplit, Grid};
 use crystfem::problem::{Capacity, Problem};
 use crystfem::simulation::{Settings, Simulation};
 
@@ -12,7 +12,8 @@ fn linear([x, y, z]: [f64; 3]) -> f64 {
 
 #[test]
 fn a_linear_field_is_exact_on_distorted_meshes() {
-    let splits = [Split::Hexahedra, Split::FiveTetrahedra, Split::SixTetrahedra, Split::Wedges];
+    let splits =
+        [CellSplit::Hexahedra, CellSplit::FiveTetrahedra, CellSplit::SixTetrahedra, CellSplit::Wedges];
     for (split, second) in splits.into_iter().flat_map(|split| [(split, false), (split, true)]) {
         for capacity in [Capacity::Lumped, Capacity::Consistent] {
             if second && capacity == Capacity::Lumped {
@@ -55,12 +56,12 @@ fn a_linear_field_is_exact_on_distorted_meshes() {
 #[test]
 fn a_flux_makes_its_gradient() {
     for (split, second) in [
-        (Split::Hexahedra, false),
-        (Split::SixTetrahedra, false),
-        (Split::Wedges, false),
-        (Split::Hexahedra, true),
-        (Split::SixTetrahedra, true),
-        (Split::Wedges, true),
+        (CellSplit::Hexahedra, false),
+        (CellSplit::SixTetrahedra, false),
+        (CellSplit::Wedges, false),
+        (CellSplit::Hexahedra, true),
+        (CellSplit::SixTetrahedra, true),
+        (CellSplit::Wedges, true),
     ] {
         let block = Block { name: "all".into(), lower: [0.0; 3], upper: [0.02, 0.01, 0.01] };
         let grid = Grid::uniform([0.0; 3], [0.02, 0.01, 0.01], [6, 3, 4]).unwrap();
@@ -69,7 +70,7 @@ fn a_flux_makes_its_gradient() {
             mesh = mesh.second_order();
         }
         let nodes = mesh.node_sets["left"].clone();
-        let surface = Where::Faces(mesh.surfaces["right"].clone());
+        let surface = FaceSelection::Faces(mesh.surfaces["right"].clone());
         let problem = Problem {
             conditions: vec![
                 Condition::Temperature { nodes, value: Field::constant(300.0) },

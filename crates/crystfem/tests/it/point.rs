@@ -1,13 +1,13 @@
 //! Scenes of the material alone, and fits, from their text to their report.
 
-use crystfem::kinetics::{Constants, Kinetics, cooling_curve};
+use crystfem::kinetics::{KineticConstants, Kinetics, cooling_curve};
 use crystfem::program::run::{Crystfem, Failure};
 use harness::case::Options;
 use harness::report::Report;
-use harness::scene::Source;
+use harness::scene::HeatSource;
 use std::path::Path;
 
-fn run_quietly(source: &Source, output: &Path, quick: bool) -> Result<Report, Failure> {
+fn run_quietly(source: &HeatSource, output: &Path, quick: bool) -> Result<Report, Failure> {
     let options = Options { quick, ..Options::new(output) };
     harness::case::run::<Crystfem>(source, options).map(|finished| finished.report)
 }
@@ -45,7 +45,7 @@ source = "formulation.md, kinetics table"
 "#;
 
 fn run_in(folder: &Path, text: &str, quick: bool) -> Report {
-    let source = Source::new(folder.join("case.toml"), text);
+    let source = HeatSource::new(folder.join("case.toml"), text);
     match run_quietly(&source, &folder.join("out"), quick) {
         Ok(report) => report,
         Err(error) => panic!("{error}"),
@@ -101,7 +101,7 @@ data = [{ file = "out/slow.csv" }, { file = "fast.csv" }]
     });
     let fast: Vec<&str> = cooling.map(|(_, line)| line).collect();
     std::fs::write(folder.path().join("fast.csv"), fast.join("\n")).expect("a file");
-    let source = Source::new(folder.path().join("fit.toml"), fit);
+    let source = HeatSource::new(folder.path().join("fit.toml"), fit);
     let report = match run_quietly(&source, &folder.path().join("fit"), false) {
         Ok(report) => report,
         Err(error) => panic!("{error}"),
@@ -116,7 +116,7 @@ data = [{ file = "out/slow.csv" }, { file = "fast.csv" }]
 /// and constants come back, of heat flows in mW that point down and in W/g that point up.
 #[test]
 fn a_fit_reads_heat_flows() {
-    let kinetics = Kinetics::new(Constants::TABLE_4_1_COLUMN_1).expect("constants");
+    let kinetics = Kinetics::new(KineticConstants::TABLE_4_1_COLUMN_1).expect("constants");
     let folder = tempfile::tempdir().expect("a folder");
     let (enthalpy, mass) = (52e3, 5.2e-6);
     let export = |name: &str, per_minute: f64, heading: &str, scale: f64| {
@@ -156,7 +156,7 @@ data = [{}, {}]
             data("slow"),
             data("fast")
         );
-        let source = Source::new(folder.path().join("fit.toml"), &text);
+        let source = HeatSource::new(folder.path().join("fit.toml"), &text);
         let output = folder.path().join("fit");
         let report = match run_quietly(&source, &output, false) {
             Ok(report) => report,

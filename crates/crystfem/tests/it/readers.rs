@@ -147,7 +147,7 @@ proptest! {
         match path::parse(Path::new("a.gcode"), &bytes) {
             Ok(path) => {
                 prop_assert!(path.moves.windows(2).all(|pair| pair[0].end <= pair[1].start && pair[0].start <= pair[0].end));
-                if let Ok(mut activation) = path.activation(&mesh, &all, Bead { width: 4e-4, height: 3e-4 }) {
+                if let Ok(mut activation) = path.activation_times(&mesh, &all, Bead { width: 4e-4, height: 3e-4 }) {
                     activation.fill(&mesh);
                     prop_assert!(activation.times.iter().all(|time| *time >= 0.0));
                 }

@@ -2,7 +2,7 @@
 
 use crate::bodies::{PA12, conductor, everywhere, film, grid, held, pa12, radiation, run};
 use crystfem::boundary::Field;
-use crystfem::material::{Conductor, Property};
+use crystfem::material::{Conductor, ThermalProperty};
 use crystfem::problem::{Birth, Capacity, Problem};
 use crystfem::simulation::{Settings, Simulation, State};
 use std::ops::ControlFlow;
@@ -13,8 +13,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 fn problem(general: bool) -> Problem {
     let mesh = grid([10e-3, 10e-3, 10e-3], [22, 20, 20]);
     let plane = 22 * 20;
-    let table = Property::table("k", vec![300.0, 500.0], vec![0.9, 1.1]).unwrap();
-    let glass = Conductor::new(2500.0, table, Property::constant("c", 800.0).unwrap()).unwrap();
+    let table = ThermalProperty::table("k", vec![300.0, 500.0], vec![0.9, 1.1]).unwrap();
+    let glass = Conductor::new(2500.0, table, ThermalProperty::constant("c", 800.0).unwrap()).unwrap();
     Problem {
         materials: vec![if general { Arc::new(glass) } else { conductor(PA12) }, pa12(Some(209e3))],
         material_of: (0..20 * plane).map(|e| u16::from(e >= 10 * plane)).collect(),

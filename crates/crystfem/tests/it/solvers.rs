@@ -1,10 +1,10 @@
 //! Factors and conjugate gradients give one temperature, and the choice follows the scene.
 
 use crate::bodies::{PA12, conductor, everywhere, film, grid, held, radiation, run};
-use crystfem::boundary::{Condition, Field, Where};
-use crystfem::mesh::{Block, Grid, Split};
+use crystfem::boundary::{Condition, FaceSelection, Field};
+use crystfem::mesh::{Block, CellSplit, Grid};
 use crystfem::problem::{Capacity, Problem};
-use crystfem::simulation::{LinearSolver, Method, Settings, Simulation};
+use crystfem::simulation::{LinearMethod, LinearSolver, Settings, Simulation};
 use crystfem::time::{Scheme, Steps};
 
 fn brick(elements: usize, capacity: Capacity, settings: Settings) -> Simulation {
@@ -12,7 +12,7 @@ fn brick(elements: usize, capacity: Capacity, settings: Settings) -> Simulation 
     let bottom = mesh.surfaces["bottom"].clone();
     let conditions = vec![
         held(&mesh, "bottom", Field::constant(353.15)),
-        film(Where::Outer { except: bottom }, 15.0, 353.15),
+        film(FaceSelection::Outer { except: bottom }, 15.0, 353.15),
     ];
     Simulation::new(Problem { conditions, capacity, ..Problem::new(mesh, conductor(PA12), 493.15) }, settings)
         .unwrap()
@@ -69,14 +69,14 @@ fn factors_of_a_scene_that_is_not_linear() {
 #[test]
 fn the_choice_follows_the_scene() {
     let settings = |dt| settings(LinearSolver::Auto, Scheme::BackwardEuler, dt);
-    assert_eq!(brick(12, Capacity::Lumped, settings(0.5)).choose(500.0).method, Method::Diagonal);
+    assert_eq!(brick(12, Capacity::Lumped, settings(0.5)).choose(500.0).method, LinearMethod::Diagonal);
     let adaptive = brick(4, Capacity::Lumped, Settings::adaptive(1.0));
     assert!(adaptive.choose(1e6).reason.contains("adaptive"));
     let mesh = grid([0.2, 1e-3, 1e-3], [200, 1, 1]);
     let conditions = vec![held(&mesh, "left", Field::constant(353.15))];
     let problem = Problem { conditions, ..Problem::new(mesh, conductor(PA12), 493.15) };
     let mut line = Simulation::new(problem, settings(100.0)).unwrap();
-    assert_eq!(line.choose(1e4).method, Method::Factors, "{:?}", line.choose(1e4));
+    assert_eq!(line.choose(1e4).method, LinearMethod::Factors, "{:?}", line.choose(1e4));
     let lines = line.explain(1e4);
     assert!(lines.iter().any(|line| line.contains("804 equations for 200 of 200 elements")), "{lines:#?}");
     run(&mut line, 1e4);
@@ -85,7 +85,7 @@ fn the_choice_follows_the_scene() {
 
 /// A block of `elements` along an edge, of distorted hexahedra or of five tetrahedra for each.
 fn distorted(elements: usize, tetrahedra: bool, surface: Condition, settings: Settings) -> Simulation {
-    let into = if tetrahedra { Split::FiveTetrahedra } else { Split::Hexahedra };
+    let into = if tetrahedra { CellSplit::FiveTetrahedra } else { CellSplit::Hexahedra };
     let block = Block { name: "body".into(), lower: [0.0; 3], upper: [0.02; 3] };
     let grid = Grid::uniform(block.lower, block.upper, [elements; 3]).unwrap();
     let mesh = grid.blocks(&[block], into).unwrap().distorted(0.1).unwrap();
@@ -166,7 +166,7 @@ fn multigrid_takes_over() {
         let mut simulation = distorted(24, true, surface, settings(solver, Scheme::BackwardEuler, 1e3));
         let begun = simulation.choose(1e4).method;
         run(&mut simulation, 1e4);
-        assert_eq!(begun, Method::Diagonal);
+        assert_eq!(begun, LinearMethod::Diagonal);
         simulation
     };
     let [diagonal, auto] = [LinearSolver::ConjugateGradients, LinearSolver::Auto].map(run_with);

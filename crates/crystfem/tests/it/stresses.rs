@@ -1,6 +1,6 @@
 //! Stress of curved bodies on distorted hexahedra: a hot spot in a plate, a ball that cools.
 
-use crystfem::mechanics::{Body, SolidifyingMaxwell, Support};
+use crystfem::mechanics::{Body, FixedComponent, SolidifyingMaxwell};
 use crystfem::mesh::Mesh;
 use evidence::{at_most, near};
 use std::collections::HashMap;
@@ -51,7 +51,7 @@ pub(crate) fn heated(mesh: &Mesh, poisson: f64, strain: impl Fn([f64; 3]) -> f64
     body.tolerance = 1e-10;
     body.born(0..mesh.element_count(), 1);
     let law = SolidifyingMaxwell::elastic(1.0, poisson, 0.0, f64::INFINITY);
-    let supports: Vec<Support> = (0..mesh.points.len() as u32)
+    let supports: Vec<FixedComponent> = (0..mesh.points.len() as u32)
         .flat_map(|node| (0..3).map(move |d| (node, d)))
         .filter(|&(node, d)| mesh.points[node as usize][d].abs() < 1e-12)
         .collect();

@@ -1,12 +1,12 @@
 //! Stress of tetrahedra of first and second order: exact states, beams, curved bodies.
 
 use crate::stresses::{ball, cooling, heat_within, heated, hot_spot};
-use crystfem::mechanics::{Body, SolidifyingMaxwell, Support};
-use crystfem::mesh::{Block, Grid, Mesh, Split};
+use crystfem::mechanics::{Body, FixedComponent, SolidifyingMaxwell};
+use crystfem::mesh::{Block, CellSplit, Grid, Mesh};
 use evidence::{at_most, near, within};
 use std::collections::HashMap;
 
-fn brick(size: [f64; 3], count: [usize; 3], split: Split, second: bool) -> Mesh {
+fn brick(size: [f64; 3], count: [usize; 3], split: CellSplit, second: bool) -> Mesh {
     let grid = Grid::uniform([0.0; 3], size, count).unwrap();
     let block = [Block { name: "all".into(), lower: [0.0; 3], upper: size }];
     let mesh = grid.blocks(&block, split).unwrap();
@@ -14,7 +14,7 @@ fn brick(size: [f64; 3], count: [usize; 3], split: Split, second: bool) -> Mesh 
 }
 
 /// 3-2-1 supports of a brick from the origin on.
-fn resting(mesh: &Mesh) -> Vec<Support> {
+fn resting(mesh: &Mesh) -> Vec<FixedComponent> {
     let far = |d: usize| {
         let most = mesh.points.iter().map(|p| p[d]).fold(0.0, f64::max);
         let at = |p: &[f64; 3]| p[d] == most && (0..3).all(|e| e == d || p[e] == 0.0);
@@ -49,13 +49,13 @@ fn largest(body: &Body, mesh: &Mesh) -> f64 {
 fn free_bodies_have_no_stress() {
     let size = [3e-3, 2e-3, 2e-3];
     for (name, split, second, linear, least, most) in [
-        ("tet4", Split::FiveTetrahedra, false, false, 0.0, 1e-10),
-        ("tet4_six", Split::SixTetrahedra, false, false, 0.0, 1e-10),
-        ("tet10", Split::FiveTetrahedra, true, false, 0.0, 1e-10),
-        ("tet10_linear", Split::SixTetrahedra, true, true, 0.0, 1e-10),
-        ("hex8_linear", Split::Hexahedra, false, true, 0.0, 1e-10),
+        ("tet4", CellSplit::FiveTetrahedra, false, false, 0.0, 1e-10),
+        ("tet4_six", CellSplit::SixTetrahedra, false, false, 0.0, 1e-10),
+        ("tet10", CellSplit::FiveTetrahedra, true, false, 0.0, 1e-10),
+        ("tet10_linear", CellSplit::SixTetrahedra, true, true, 0.0, 1e-10),
+        ("hex8_linear", CellSplit::Hexahedra, false, true, 0.0, 1e-10),
         // constant strains cannot bend: this is the locking of the first order
-        ("tet4_linear", Split::SixTetrahedra, false, true, 0.05, 0.5),
+        ("tet4_linear", CellSplit::SixTetrahedra, false, true, 0.05, 0.5),
     ] {
         let mesh = brick(size, [3, 2, 2], split, second);
         let mesh = if linear { mesh } else { mesh.distorted(0.15).unwrap() };
@@ -83,7 +83,7 @@ fn curvature(mesh: &Mesh, body: &Body) -> f64 {
 #[test]
 fn a_bimetal_bends() {
     let found = |count: [usize; 3], second: bool| {
-        let mesh = brick([0.04, 2e-3, 3e-3], count, Split::SixTetrahedra, second);
+        let mesh = brick([0.04, 2e-3, 3e-3], count, CellSplit::SixTetrahedra, second);
         let low = |e: usize| mesh.centre(e as u32)[2] < 1e-3;
         let body =
             step(&mesh, 0.0, |e| if low(e) { 3e9 } else { 1.5e9 }, |e, _| if low(e) { -0.01 } else { -0.02 });
@@ -209,10 +209,10 @@ fn a_hot_spot_in_a_plate() {
 /// Elements of all kinds beside each other, and those that have none.
 #[test]
 fn kinds_are_told_apart() {
-    let wedges = brick([1.0; 3], [1, 1, 1], Split::Wedges, false);
+    let wedges = brick([1.0; 3], [1, 1, 1], CellSplit::Wedges, false);
     assert!(Body::new(&wedges, 0.3).is_err());
     assert!(Body::new(&wedges.second_order(), 0.3).is_err());
-    let mut both = brick([1.0; 3], [1, 1, 1], Split::Hexahedra, false);
+    let mut both = brick([1.0; 3], [1, 1, 1], CellSplit::Hexahedra, false);
     // a tetrahedron with one face's nodes, and one of second order upside down
     both.points.push([0.3, 0.3, 2.0]);
     both.tetrahedra.push([4, 5, 7, 8]);

@@ -2,9 +2,9 @@
 //! with the order that it needs.
 
 use crate::bodies::{PA12, conductor, everywhere, film, grid, held, radiation, run};
-use crystfem::boundary::{Field, Where};
+use crystfem::boundary::{FaceSelection, Field};
 use crystfem::exact::{Freezing, steady_wall};
-use crystfem::material::{Conductor, Property};
+use crystfem::material::{Conductor, ThermalProperty};
 use crystfem::mesh::Mesh;
 use crystfem::problem::{Birth, Problem};
 use crystfem::simulation::{Settings, Simulation};
@@ -55,7 +55,7 @@ fn a_half_space_with_its_surface_held() {
 fn a_half_space_with_film() {
     let (found, order) = extrapolate([80, 160, 320].map(|elements| {
         let mesh = line(0.016, elements);
-        let conditions = vec![film(Where::Faces(mesh.surfaces["left"].clone()), 50.0, COLD)];
+        let conditions = vec![film(FaceSelection::Faces(mesh.surfaces["left"].clone()), 50.0, COLD)];
         let problem = Problem { conditions, ..Problem::new(mesh, conductor(PA12), HOT) };
         let mut simulation = Simulation::new(problem, precise(1e-6)).unwrap();
         run(&mut simulation, 20.0);
@@ -119,7 +119,8 @@ fn a_wall_with_film() {
     let length = 5e-3;
     let (found, order) = extrapolate([8, 16, 32].map(|elements| {
         let mesh = line(length, elements);
-        let conditions = vec![film(Where::Faces(mesh.surfaces["right"].clone()), PA12[0] / length, COLD)];
+        let conditions =
+            vec![film(FaceSelection::Faces(mesh.surfaces["right"].clone()), PA12[0] / length, COLD)];
         let problem = Problem { conditions, ..Problem::new(mesh, conductor(PA12), HOT) };
         let mut simulation = Simulation::new(problem, precise(1e-7)).unwrap();
         run(&mut simulation, 0.5 * length * length / diffusivity);
@@ -148,13 +149,14 @@ fn freezing() {
         let mesh = line(0.018, elements);
         let conditions = vec![held(&mesh, "left", Field::constant(COLD))];
         let peak = PA12[2] + exact.latent_heat / width;
-        let heat = Property::table(
+        let heat = ThermalProperty::table(
             "c",
             vec![450.0 - 1.0001 * width, 450.0 - width, 450.0, 450.0 + width, 450.0 + 1.0001 * width],
             vec![PA12[2], PA12[2], peak, PA12[2], PA12[2]],
         )
         .unwrap();
-        let material = Conductor::new(PA12[1], Property::constant("k", PA12[0]).unwrap(), heat).unwrap();
+        let material =
+            Conductor::new(PA12[1], ThermalProperty::constant("k", PA12[0]).unwrap(), heat).unwrap();
         let problem = Problem { conditions, ..Problem::new(mesh, Arc::new(material), HOT) };
         let mut simulation = Simulation::new(problem, Settings { tolerance: 1e-7, ..precise(0.02) }).unwrap();
         run(&mut simulation, 20.0);
@@ -176,13 +178,13 @@ fn freezing() {
 fn conductivity_that_follows_temperature() {
     let slope = 5e-3;
     let k = |t: f64| PA12[0] * (1.0 + slope * (t - COLD));
-    let table = Property::table("k", vec![COLD, HOT], vec![k(COLD), k(HOT)]).unwrap();
+    let table = ThermalProperty::table("k", vec![COLD, HOT], vec![k(COLD), k(HOT)]).unwrap();
     let errors = [8, 16, 32].map(|elements| {
         let mesh = line(0.01, elements);
         let conditions =
             vec![held(&mesh, "left", Field::constant(COLD)), held(&mesh, "right", Field::constant(HOT))];
         let material =
-            Conductor::new(PA12[1], table.clone(), Property::constant("c", PA12[2]).unwrap()).unwrap();
+            Conductor::new(PA12[1], table.clone(), ThermalProperty::constant("c", PA12[2]).unwrap()).unwrap();
         let problem = Problem { conditions, ..Problem::new(mesh, Arc::new(material), 400.0) };
         let mut simulation = Simulation::new(problem, Settings::backward_euler(1e8)).unwrap();
         run(&mut simulation, 4e8);
@@ -196,8 +198,8 @@ fn conductivity_that_follows_temperature() {
 
 /// k that jumps tenfold at 423.15 K within 1e-6 K, upwards or downwards.
 fn jumping(values: [f64; 2]) -> Conductor {
-    let k = Property::table("k", vec![423.15, 423.15 + 1e-6], values.to_vec()).unwrap();
-    Conductor::new(PA12[1], k, Property::constant("c", PA12[2]).unwrap()).unwrap()
+    let k = ThermalProperty::table("k", vec![423.15, 423.15 + 1e-6], values.to_vec()).unwrap();
+    Conductor::new(PA12[1], k, ThermalProperty::constant("c", PA12[2]).unwrap()).unwrap()
 }
 
 /// At rest between 353.15 and 493.15 K Kirchhoff's θ is linear, whatever the mesh: the flux is θ over the length to

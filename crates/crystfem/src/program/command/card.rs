@@ -1,6 +1,6 @@
 //! `crystfem card`: the thermal materials of a scene as cards of other programs.
 
-use crate::material::{CONSTANT_NAMES, Polymer, Property};
+use crate::material::{CONSTANT_NAMES, Polymer, ThermalProperty};
 use crate::program::run::Failure;
 use crate::program::scene::{Kind, Law, MaterialSpec, PartScene, PointScene, kind};
 use harness::scene::{SceneError, Source};
@@ -171,7 +171,7 @@ fn card(
 
 /// The fifteen constants of UMATHT in the host's units; none with properties over temperature.
 fn constants(polymer: &Polymer, options: &Options) -> Option<Vec<f64>> {
-    let (Property::Constant(conductivity), Property::Constant(capacity)) =
+    let (ThermalProperty::Constant(conductivity), ThermalProperty::Constant(capacity)) =
         (&polymer.conductivity, &polymer.specific_heat)
     else {
         return None;
@@ -192,10 +192,10 @@ fn digits(number: f64) -> String {
 }
 
 /// A value, or rows of a value and its temperature.
-fn lines(property: &Property, factor: f64, zero: f64) -> String {
+fn lines(property: &ThermalProperty, factor: f64, zero: f64) -> String {
     match property {
-        Property::Constant(value) => digits(factor * value) + "\n",
-        Property::Table(table) => table
+        ThermalProperty::Constant(value) => digits(factor * value) + "\n",
+        ThermalProperty::Table(table) => table
             .rows()
             .map(|[temperature, value]| {
                 format!("{}, {}\n", digits(factor * value), digits(temperature - zero))

@@ -2,7 +2,7 @@
 
 use super::celsius::CELSIUS;
 use crate::error::Error;
-use crate::mesh::Place;
+use crate::mesh::LocatedPoint;
 use crate::program::scene::{PartScene, Task};
 use crate::simulation::Simulation;
 use harness::observe::{Observer, Outputs};
@@ -21,7 +21,8 @@ impl Observer<Simulation, Error> for Lines<'_> {
     fn write(&self, simulation: &Simulation, to: &Outputs) -> Result<(), Error> {
         let names = simulation.field_names();
         for (line, places) in self.scene.output.line.iter().zip(&self.task.lines) {
-            let exists = |place: &&Place| place.elements().iter().any(|&element| simulation.is_born(element));
+            let exists =
+                |place: &&LocatedPoint| place.elements().iter().any(|&element| simulation.is_born(element));
             let along = |value: &dyn Fn(u32) -> Option<f64>| -> Vec<f64> {
                 let there = places.iter().map(|place| place.as_ref().filter(exists));
                 there.map(|place| place.and_then(|place| place.value(value)).unwrap_or(f64::NAN)).collect()

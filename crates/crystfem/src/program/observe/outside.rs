@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::mesh::Mesh;
-use crate::mesh::surface::Surface;
+use crate::mesh::surface::OuterSurface;
 use harness::output::picture::{Corner, Plane, Skin};
 
 /// A frame: what it is called, the values of its fields at the nodes, and which elements exist.
@@ -20,7 +20,7 @@ pub struct Outside<'a> {
     elements: &'a [u32],
     /// Whether each element of the mesh is one of them.
     is_one: Vec<bool>,
-    surface: Surface,
+    surface: OuterSurface,
     cut: Option<Plane>,
 }
 
@@ -28,12 +28,12 @@ impl<'a> Outside<'a> {
     /// Of some elements, cut by a plane.
     ///
     /// # Errors
-    /// See [`Surface::new`].
+    /// See [`OuterSurface::new`].
     pub fn new(mesh: &'a Mesh, elements: &'a [u32], cut: Option<Plane>) -> Result<Self, Error> {
         let mut is_one = vec![false; mesh.element_count()];
         elements.iter().for_each(|&element| is_one[element as usize] = true);
         let points = mesh.points.as_slice().into();
-        Ok(Self { mesh, points, elements, is_one, surface: Surface::new(mesh)?, cut })
+        Ok(Self { mesh, points, elements, is_one, surface: OuterSurface::new(mesh)?, cut })
     }
 
     /// With the nodes somewhere else, m.
@@ -84,13 +84,13 @@ impl<'a> Outside<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::{Block, Grid, Split};
+    use crate::mesh::{Block, CellSplit, Grid};
     use harness::output::picture::{Plane, View};
 
     /// A field x + 2y over a brick whose last column does not exist yet: its outside, and its section at y = 1.
     #[test]
     fn only_what_exists_is_seen() {
-        for (cells, quads) in [(Split::Hexahedra, 1), (Split::FiveTetrahedra, 2)] {
+        for (cells, quads) in [(CellSplit::Hexahedra, 1), (CellSplit::FiveTetrahedra, 2)] {
             let block = Block { name: "brick".into(), lower: [0.0; 3], upper: [3.0, 2.0, 1.0] };
             let grid = Grid::uniform([0.0; 3], [3.0, 2.0, 1.0], [3, 2, 1]).unwrap();
             let mesh = grid.blocks(&[block], cells).unwrap();

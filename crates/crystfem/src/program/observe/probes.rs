@@ -2,7 +2,7 @@
 
 use super::celsius::CELSIUS;
 use crate::error::Error;
-use crate::mesh::Place;
+use crate::mesh::LocatedPoint;
 use crate::program::quantities as q;
 use crate::program::scene::{PartScene, ProbeSpec, Task};
 use crate::simulation::Simulation;
@@ -19,7 +19,7 @@ const ROWS: usize = 4000;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Probe {
     name: String,
-    place: Place,
+    place: LocatedPoint,
     time: Vec<f64>,
     /// °C.
     temperature: Vec<f64>,
@@ -29,7 +29,7 @@ pub struct Probe {
 
 impl Probe {
     /// At a place, of which nothing is recorded yet.
-    pub fn new(spec: &ProbeSpec, place: &Place, fields: usize) -> Self {
+    pub fn new(spec: &ProbeSpec, place: &LocatedPoint, fields: usize) -> Self {
         Self {
             name: spec.name.clone(),
             place: place.clone(),

@@ -80,7 +80,7 @@ impl Section {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::{Block, Grid, Split};
+    use crate::mesh::{Block, CellSplit, Grid};
 
     /// A trilinear field comes back at every sample, and nothing where nothing is.
     #[test]
@@ -119,7 +119,7 @@ mod tests {
         assert!((share - 0.125).abs() < 2e-3, "{share}");
         let block = Block { name: "brick".into(), lower: [0.0; 3], upper: [3.0, 2.0, 1.0] };
         let grid = Grid::uniform([0.0; 3], [3.0, 2.0, 1.0], [5, 3, 2]).unwrap();
-        let mesh = grid.blocks(&[block], Split::FiveTetrahedra).unwrap();
+        let mesh = grid.blocks(&[block], CellSplit::FiveTetrahedra).unwrap();
         let all: Vec<u32> = (0..mesh.element_count() as u32).collect();
         let section = Section::through_the_middle(&mesh, &all).unwrap();
         let field: Vec<f64> = mesh.points.iter().map(|[x, y, z]| 1.0 + 2.0 * x - y + 3.0 * z).collect();

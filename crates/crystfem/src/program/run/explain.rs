@@ -1,7 +1,7 @@
 //! What a part's scene builds and leaves out, and how it will be solved.
 
 use super::Failure;
-use crate::boundary::{Condition, Where};
+use crate::boundary::{Condition, FaceSelection};
 use crate::program::observe::observers;
 use crate::program::scene::{PartScene, millimetres};
 use crate::simulation::Simulation;
@@ -103,9 +103,11 @@ pub fn one(source: &Source, scene: &PartScene) -> Result<(Vec<String>, Vec<Named
 /// A condition in words.
 fn told(condition: &Condition) -> String {
     let place = match condition.surface() {
-        Some(Where::Outer { except }) if except.is_empty() => "the current outer surface".to_owned(),
-        Some(Where::Outer { except }) => format!("the current outer surface except {} faces", except.len()),
-        Some(Where::Faces(faces)) => format!("{} faces", faces.len()),
+        Some(FaceSelection::Outer { except }) if except.is_empty() => "the current outer surface".to_owned(),
+        Some(FaceSelection::Outer { except }) => {
+            format!("the current outer surface except {} faces", except.len())
+        }
+        Some(FaceSelection::Faces(faces)) => format!("{} faces", faces.len()),
         None => String::new(),
     };
     let what = match condition {

@@ -3,7 +3,7 @@
 use super::Failure;
 use super::{fit_part, heat_flow};
 use crate::error::Error;
-use crate::fit::{Fit, Known, MeasuredPeak, avrami, nakamura, ozawa};
+use crate::fit::{FixedConstants, KineticFit, MeasuredPeak, avrami, nakamura, ozawa};
 use crate::program::observe::celsius::{CELSIUS, of_kelvin};
 use crate::program::quantities as q;
 use crate::program::scene::{FitLaw, FitScene, FitSpec, Job};
@@ -20,17 +20,17 @@ use std::path::Path;
 /// A finished fit and the abscissae of its measurements, series by series.
 struct Done {
     name: String,
-    fit: Fit,
+    fit: KineticFit,
     abscissa: (&'static str, &'static str),
     series: Vec<(String, Vec<f64>, Vec<f64>)>,
     /// What was known of the kinetics, of `nakamura`.
-    known: Option<Known>,
+    known: Option<FixedConstants>,
 }
 
 impl Done {
     /// The fitted kinetics as a key of a material of a scene.
     fn block(&self) -> Option<String> {
-        let Known { equilibrium_melting, frozen, activation_energy } = self.known?;
+        let FixedConstants { equilibrium_melting, frozen, activation_energy } = self.known?;
         let of = |name: &str| self.fit.estimates.iter().find(|one| one.name == name).map(|one| one.value);
         let [rate, nucleation, n] = ["growth_rate", "nucleation", "avrami_exponent"].map(of);
         Some(format!(
@@ -126,7 +126,7 @@ pub fn explain(source: &Source, scene: &FitScene) -> Result<Vec<String>, SceneEr
 /// How the tables of a scene are understood, a line each.
 pub fn read<'a>(source: &'a Source, scene: &'a FitScene) -> impl Iterator<Item = String> + 'a {
     let tables = scene.fit.iter().flat_map(|spec| &spec.data);
-    tables.filter_map(|data| crate::table::understood(&source.file(&data.file)))
+    tables.filter_map(|data| crate::table::describe_format(&source.file(&data.file)))
 }
 
 fn solve(spec: &FitSpec, job: Job, run: &mut harness::case::Run) -> Result<Vec<Done>, Failure> {

@@ -2,8 +2,8 @@
 
 use super::Failure;
 use crate::error::Error;
-use crate::fit::{self, Fit};
-use crate::kinetics::Constants;
+use crate::fit::{self, KineticFit};
+use crate::kinetics::KineticConstants;
 use crate::program::observe::celsius::CELSIUS;
 use crate::program::observe::{Probe, record};
 use crate::program::scene::PartFit;
@@ -14,11 +14,11 @@ use std::cell::RefCell;
 pub fn solve(
     job: &PartFit,
     show: &mut dyn FnMut(usize) -> Result<(), polycore::Error>,
-) -> Result<Fit, Failure> {
+) -> Result<KineticFit, Failure> {
     // a first trial whose failure is the scene's has its own error
     trial(job, &job.constants)?;
     let (state, stopped) = (RefCell::new((0, show)), RefCell::new(None));
-    let model = |constants: &Constants| -> Option<Vec<[f64; 2]>> {
+    let model = |constants: &KineticConstants| -> Option<Vec<[f64; 2]>> {
         let (count, show) = &mut *state.borrow_mut();
         *count += 1;
         if stopped.borrow().is_some() {
@@ -30,7 +30,7 @@ pub fn solve(
         }
         trial(job, constants).ok()
     };
-    let found = fit::part(&model, &job.degrees(), &job.constants);
+    let found = fit::fit_in_part(&model, &job.degrees(), &job.constants);
     match stopped.into_inner() {
         Some(error) => Err(Error::from(error).into()),
         None => Ok(found?),
@@ -38,7 +38,7 @@ pub fn solve(
 }
 
 /// Temperature, K, and α at each measurement of a part with such constants.
-fn trial(job: &PartFit, constants: &Constants) -> Result<Vec<[f64; 2]>, Failure> {
+fn trial(job: &PartFit, constants: &KineticConstants) -> Result<Vec<[f64; 2]>, Failure> {
     let scene = job.with(constants);
     let task = scene.task(&job.source, scene.mesh.build(&job.source)?)?;
     let mut simulation = Simulation::new(std::sync::Arc::clone(&task.problem), task.settings)?;

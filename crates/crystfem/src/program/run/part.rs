@@ -2,7 +2,7 @@
 
 use super::Failure;
 use crate::error::Error;
-use crate::ledger::Record;
+use crate::ledger::StepBalance;
 use crate::mesh::Mesh;
 use crate::program::observe::celsius::{TEMPERATURE, of_kelvin};
 use crate::program::observe::{FIELDS, Observers, observers};
@@ -107,7 +107,7 @@ pub fn explain(source: &Source, scene: &PartScene) -> Result<Vec<String>, Failur
 }
 
 /// A time step, as who watches the run sees it: temperatures and the materials' fields at the nodes, NaN where nothing is yet.
-fn seen(simulation: &Simulation, step: &Record, names: &[&'static str]) -> Step {
+fn seen(simulation: &Simulation, step: &StepBalance, names: &[&'static str]) -> Step {
     let mut fields = vec![StepField {
         name: TEMPERATURE,
         unit: "°C",
@@ -150,7 +150,7 @@ fn solve(
     while *frames <= last {
         let until = (*frames as f64 * every).min(end);
         let mut result = Ok(());
-        let mut observe = |simulation: &Simulation, step: &Record| -> ControlFlow<()> {
+        let mut observe = |simulation: &Simulation, step: &StepBalance| -> ControlFlow<()> {
             result = simulation.finite().and_then(|()| observers.see(simulation));
             let state = simulation.state();
             run.show(state.time / end, &|| {

@@ -3,7 +3,7 @@
 use super::Failure;
 use super::draw::{self, Run};
 use crate::error::Error;
-use crate::point::{Course, Curves, Drive, Event, Stepping};
+use crate::point::{CurveEvent, Curves, Drive, PointProcess, Stepping};
 use crate::program::observe::celsius::CELSIUS;
 use crate::program::quantities as q;
 use crate::program::scene::{NodesSpec, PointScene};
@@ -41,7 +41,7 @@ pub fn run(source: &Source, scene: &PointScene, run: &mut harness::case::Run) ->
             let name = [point.name.as_str(), material_name].join(".");
             let name = name.trim_end_matches('.').to_owned();
             phases.start("integrate");
-            let course = Course { material: &**material, drive: drive.clone(), stepping };
+            let course = PointProcess { material: &**material, drive: drive.clone(), stepping };
             let curves = course.run()?;
             let broken = non_finite(&course, &curves);
             match broken.first() {
@@ -143,7 +143,7 @@ fn opened(source: &Source, index: usize, nodes: &NodesSpec) -> Result<String, Sc
 }
 
 /// Rows with a value that is not finite: its name and the time.
-fn non_finite(course: &Course, curves: &Curves) -> Vec<(&'static str, f64)> {
+fn non_finite(course: &PointProcess, curves: &Curves) -> Vec<(&'static str, f64)> {
     let names = course.material.field_names();
     let wrong = |row: usize| {
         let fields = names.iter().copied().zip(curves.fields[row].iter().copied());
@@ -158,7 +158,7 @@ fn non_finite(course: &Course, curves: &Curves) -> Vec<(&'static str, f64)> {
 }
 
 /// The scalars of a run, of a point that must leave the finite numbers those of its finite rows; temperatures in °C as the thesis has them.
-fn record(report: &mut Report, name: &str, course: &Course, curves: &Curves) -> Result<(), Error> {
+fn record(report: &mut Report, name: &str, course: &PointProcess, curves: &Curves) -> Result<(), Error> {
     let rows = curves.time.len();
     let last = rows - 1;
     let named = |quantity: &str| format!("{name}.{quantity}");
@@ -183,7 +183,7 @@ fn record(report: &mut Report, name: &str, course: &Course, curves: &Curves) -> 
             report.value(q::FIRST_STEP.of(&[name, field]), curves.fields[1][index]);
         }
     }
-    let mut event = |what: &str, event: Event| {
+    let mut event = |what: &str, event: CurveEvent| {
         report.value(q::TEMPERATURE_AT.of(&[name, what]), event.temperature - CELSIUS);
         report.value(q::TIME_TO.of(&[name, what]), event.time - curves.time[0]);
         event
@@ -221,7 +221,7 @@ fn compare(report: &mut Report, scene: &PointScene) {
 }
 
 /// NAME.csv: every row.
-fn write(output: &Path, name: &str, course: &Course, curves: &Curves) -> Result<(), polycore::Error> {
+fn write(output: &Path, name: &str, course: &PointProcess, curves: &Curves) -> Result<(), polycore::Error> {
     let celsius: Vec<f64> = curves.temperature.iter().map(|t| t - CELSIUS).collect();
     let mut columns: Vec<(&str, &str, Vec<f64>)> =
         vec![("time", "s", curves.time.clone()), ("temperature", "degC", celsius)];

@@ -47,7 +47,7 @@ pub(super) fn timed(
                     notes.push(format!(
                         "times by the limits that the file states: {limits}; waits for temperatures left out"
                     ));
-                    (path.as_stated(), "with the limits that the file states")
+                    (path.with_stated_limits(), "with the limits that the file states")
                 }
                 None => {
                     notes.push("times at F: the file states no limits of acceleration; waits for temperatures left out".into());
@@ -56,7 +56,7 @@ pub(super) fn timed(
             }
         }
         (Some(acceleration), Some(jerk)) => {
-            let path = path.accelerated(acceleration.si(), jerk.si());
+            let path = path.with_acceleration(acceleration.si(), jerk.si());
             (path.map_err(|error| located_in(source, block, &KEYS, &error))?, "with the limits of the scene")
         }
         (given, _) => {
@@ -68,7 +68,7 @@ pub(super) fn timed(
             ));
         }
     };
-    notes.extend(path.compared(with));
+    notes.extend(path.compare_estimate(with));
     Ok(path)
 }
 
@@ -79,7 +79,7 @@ pub(super) fn purged(
     mut path: ToolPath,
     notes: &mut Vec<String>,
 ) -> Result<ToolPath, SceneError> {
-    if let Some((count, line, share)) = path.without_loose() {
+    if let Some((count, line, share)) = path.remove_loose() {
         let told = format!(
             "{count} printing moves have no room above the bed (z ≤ 0) or fall through the air, the first in line {line}: {:.2} % of the filament",
             100.0 * share
@@ -113,7 +113,7 @@ pub(super) fn leave_out(
     }
     let before = path.fed();
     for (index, name) in names.iter().enumerate() {
-        match path.without(name) {
+        match path.remove_feature(name) {
             None => {
                 let allowed =
                     format!("what the file prints ({}), or one of {}", list.join(", "), FAMILIES.join(", "));
@@ -126,7 +126,7 @@ pub(super) fn leave_out(
         }
     }
     let share = 100.0 * (1.0 - path.fed() / before);
-    if !path.is_fed() {
+    if !path.has_feed() {
         return Err(source.error(
             &key,
             "all that the file prints",

@@ -5,8 +5,8 @@ use super::fit_part::PartFit;
 use super::fit_spec::{FitLaw, FitSpec, alpha, table, temperature, time};
 use super::material::KINETICS_KEYS;
 use super::{OutputSpec, Program, check_name};
-use crate::fit::{Cooling, Known, MeasuredPeak, Run};
-use crate::kinetics::{Constants, Kinetics};
+use crate::fit::{Cooling, FixedConstants, MeasuredPeak, Run};
+use crate::kinetics::{KineticConstants, Kinetics};
 use harness::report::Expect;
 use harness::scene::{SceneError, Source};
 use serde::Deserialize;
@@ -37,7 +37,7 @@ pub enum Job {
     /// Cooling curves, and where to compare them, K.
     Ozawa(Vec<Cooling>, Vec<f64>),
     /// Runs, and what is known.
-    Nakamura(Vec<Run>, Known),
+    Nakamura(Vec<Run>, FixedConstants),
     /// A part, and what was measured in it.
     Part(Box<PartFit>),
 }
@@ -200,7 +200,7 @@ impl FitSpec {
         }
     }
 
-    fn known(&self, source: &Source, key: &dyn Fn(&str) -> String) -> Result<Known, SceneError> {
+    fn known(&self, source: &Source, key: &dyn Fn(&str) -> String) -> Result<FixedConstants, SceneError> {
         let Some(melting) = self.equilibrium_melting else {
             let allowed = "`equilibrium_melting`: the temperature T₀, e.g. by a Hoffman–Weeks plot";
             return Err(source.error(&key("equilibrium_melting"), "nothing", allowed));
@@ -217,13 +217,13 @@ impl FitSpec {
                 return Err(source.error(&key("glass_transition"), found, "one of them"));
             }
         };
-        let example = Constants::TABLE_4_1_COLUMN_1;
-        let known = Known {
+        let example = KineticConstants::TABLE_4_1_COLUMN_1;
+        let known = FixedConstants {
             equilibrium_melting: melting.si(),
             frozen,
             activation_energy: self.activation_energy.map_or(example.activation_energy, |u| u.si()),
         };
-        let trial = Constants {
+        let trial = KineticConstants {
             equilibrium_melting: known.equilibrium_melting,
             frozen: known.frozen,
             activation_energy: known.activation_energy,

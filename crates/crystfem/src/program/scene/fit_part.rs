@@ -3,7 +3,7 @@
 use super::fit_spec::{FitSpec, alpha, table, time};
 use super::material::KineticsSpec;
 use super::{Kind, PartScene};
-use crate::kinetics::Constants;
+use crate::kinetics::KineticConstants;
 use harness::scene::{SceneError, Source};
 
 /// A part, and what was measured in it.
@@ -13,14 +13,14 @@ pub struct PartFit {
     scene: PartScene,
     material: String,
     /// The constants that it has.
-    pub constants: Constants,
+    pub constants: KineticConstants,
     /// Of each file: the probe's place among those of the part, times, s, and α.
     pub curves: Vec<(usize, Vec<f64>, Vec<f64>)>,
 }
 
 impl PartFit {
     /// The part with other constants.
-    pub fn with(&self, constants: &Constants) -> PartScene {
+    pub fn with(&self, constants: &KineticConstants) -> PartScene {
         let mut scene = self.scene.clone();
         if let Some(material) = scene.materials.get_mut(&self.material) {
             material.kinetics = Some(KineticsSpec::Named(*constants));

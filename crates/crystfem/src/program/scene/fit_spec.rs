@@ -2,7 +2,7 @@
 
 use super::fault::located;
 use crate::fit::{Baseline, DEGREES};
-use crate::table::{Column, read};
+use crate::table::{TableColumn, read};
 use harness::scene::{SceneError, Source};
 use polycore::units::dimension::{RatioDimension, TemperatureDimension, TimeDimension};
 use polycore::units::{Mass, MolarEnergy, SpecificEnergy, Temperature, TemperatureRate, Time};
@@ -118,17 +118,17 @@ impl<'de> Deserialize<'de> for Limit {
     }
 }
 
-pub(super) fn time() -> Column {
-    Column::of::<TimeDimension>("time")
+pub(super) fn time() -> TableColumn {
+    TableColumn::new::<TimeDimension>("time")
 }
 
-pub(super) fn temperature() -> Column {
-    Column::of::<TemperatureDimension>("temperature")
+pub(super) fn temperature() -> TableColumn {
+    TableColumn::new::<TemperatureDimension>("temperature")
 }
 
 /// Column of α.
-pub(super) fn alpha() -> Column {
-    Column::of::<RatioDimension>("alpha").within(DEGREES[0], DEGREES[1])
+pub(super) fn alpha() -> TableColumn {
+    TableColumn::new::<RatioDimension>("alpha").within(DEGREES[0], DEGREES[1])
 }
 
 /// Reads a table beside the scene.
@@ -136,7 +136,7 @@ pub(super) fn table<const N: usize>(
     source: &Source,
     key: &str,
     file: &Path,
-    columns: [Column; N],
+    columns: [TableColumn; N],
 ) -> Result<[Vec<f64>; N], SceneError> {
     read(&source.file(file), columns).map_err(|error| located(source, key, &error))
 }

@@ -4,7 +4,7 @@ use super::fault::located;
 use super::fit_spec::{DataSpec, Direction, FitLaw, FitSpec, HeatFlowSpec, Limit, temperature, time};
 use crate::error::Error;
 use crate::fit::{MeasuredPeak, Thermogram};
-use crate::table::{Column, read_with_lines};
+use crate::table::{TableColumn, read_with_lines};
 use harness::scene::{SceneError, Source};
 use polycore::units::dimension::{PowerDimension, SpecificPowerDimension};
 use std::path::Path;
@@ -103,8 +103,8 @@ impl FitSpec {
     ) -> Result<Table, SceneError> {
         let read = |per_mass: bool| {
             let heat_flow = match per_mass {
-                true => Column::of::<SpecificPowerDimension>("heat_flow"),
-                false => Column::of::<PowerDimension>("heat_flow"),
+                true => TableColumn::new::<SpecificPowerDimension>("heat_flow"),
+                false => TableColumn::new::<PowerDimension>("heat_flow"),
             };
             if self.law == FitLaw::Avrami {
                 let ([times, flows], lines) = read_with_lines(path, [time(), heat_flow])?;

@@ -4,8 +4,10 @@ use super::either::{self, TextOrTable};
 use super::fault::{located, located_in};
 use super::powder::PowderSpec;
 use crate::error::Error;
-use crate::kinetics::{Constants, Kinetics};
-use crate::material::{AsPublished, Conductor, Polymer, Property, Semicrystalline, Sign, ThermalMaterial};
+use crate::kinetics::{KineticConstants, Kinetics};
+use crate::material::{
+    Conductor, Polymer, PublishedSubroutine, Semicrystalline, Sign, ThermalMaterial, ThermalProperty,
+};
 use crate::melting::Melting;
 use harness::scene::{SceneError, Source};
 use polycore::units::dimension::{ConductivityDimension, SpecificHeatDimension};
@@ -23,7 +25,7 @@ pub enum Law {
     Conductor,
     /// [`Semicrystalline`].
     Semicrystalline,
-    /// [`AsPublished`]: Appendix B as coded.
+    /// [`PublishedSubroutine`]: Appendix B as coded.
     AsPublished,
 }
 
@@ -104,7 +106,7 @@ pub struct TableSpec<D> {
 #[derive(Clone, Debug)]
 pub enum KineticsSpec {
     /// Of the thesis.
-    Named(Constants),
+    Named(KineticConstants),
     /// One by one.
     Given(GivenKinetics),
 }
@@ -151,10 +153,10 @@ pub struct GivenMelting {
 }
 
 const KINETICS_NAMES: [&str; 3] = ["table-4.1-column-1", "table-4.1-column-2", "appendix-b"];
-const KINETICS: [(&str, Constants); 3] = [
-    (KINETICS_NAMES[0], Constants::TABLE_4_1_COLUMN_1),
-    (KINETICS_NAMES[1], Constants::TABLE_4_1_COLUMN_2),
-    (KINETICS_NAMES[2], Constants::APPENDIX_B),
+const KINETICS: [(&str, KineticConstants); 3] = [
+    (KINETICS_NAMES[0], KineticConstants::TABLE_4_1_COLUMN_1),
+    (KINETICS_NAMES[1], KineticConstants::TABLE_4_1_COLUMN_2),
+    (KINETICS_NAMES[2], KineticConstants::APPENDIX_B),
 ];
 
 /// Where parameters of the kinetics stand in their block.
@@ -187,10 +189,14 @@ impl MaterialSpec {
             }
             Law::AsPublished => {
                 let sign = match self.sign {
-                    Some(SignSpec::Mended) => Sign::Mended,
+                    Some(SignSpec::Mended) => Sign::Corrected,
                     _ => Sign::AsPublished,
                 };
-                Box::new(AsPublished::new(self.conductor(source, key)?, sign, self.guarded.unwrap_or(false)))
+                Box::new(PublishedSubroutine::new(
+                    self.conductor(source, key)?,
+                    sign,
+                    self.guarded.unwrap_or(false),
+                ))
             }
         })
     }
@@ -246,7 +252,7 @@ impl MaterialSpec {
     }
 
     /// Conductivity and specific heat.
-    pub(crate) fn properties(&self, source: &Source, key: &str) -> Result<[Property; 2], SceneError> {
+    pub(crate) fn properties(&self, source: &Source, key: &str) -> Result<[ThermalProperty; 2], SceneError> {
         let of = |name: &str| format!("{key}.{name}");
         Ok([
             self.conductivity.build(source, &of("conductivity"), "conductivity, W/(m K)")?,
@@ -258,7 +264,7 @@ impl MaterialSpec {
     ///
     /// # Errors
     /// A [`SceneError`] where some are missing or given twice.
-    pub(super) fn constants(&self, source: &Source, key: &str) -> Result<Constants, SceneError> {
+    pub(super) fn constants(&self, source: &Source, key: &str) -> Result<KineticConstants, SceneError> {
         match &self.kinetics {
             Some(KineticsSpec::Named(constants)) => Ok(*constants),
             Some(KineticsSpec::Given(given)) => given.constants(source, key),
@@ -319,7 +325,7 @@ impl MaterialSpec {
 }
 
 impl GivenKinetics {
-    fn constants(&self, source: &Source, key: &str) -> Result<Constants, SceneError> {
+    fn constants(&self, source: &Source, key: &str) -> Result<KineticConstants, SceneError> {
         let frozen = match (self.frozen, self.glass_transition) {
             (Some(frozen), None) => frozen.si(),
             (None, Some(glass)) => glass.si() - 30.0,
@@ -336,8 +342,8 @@ impl GivenKinetics {
                 return Err(source.error(&at, "`glass_transition` together with `frozen`", "one of them"));
             }
         };
-        let energy = Constants::TABLE_4_1_COLUMN_1.activation_energy;
-        Ok(Constants {
+        let energy = KineticConstants::TABLE_4_1_COLUMN_1.activation_energy;
+        Ok(KineticConstants {
             growth_rate: self.growth_rate.si(),
             nucleation: self.nucleation.si(),
             activation_energy: self.activation_energy.map_or(energy, Quantity::si),
@@ -349,15 +355,15 @@ impl GivenKinetics {
 }
 
 impl<D: Dimension + Copy> PropertySpec<D> {
-    fn build(&self, source: &Source, key: &str, name: &'static str) -> Result<Property, SceneError> {
+    fn build(&self, source: &Source, key: &str, name: &'static str) -> Result<ThermalProperty, SceneError> {
         match self {
-            Self::Constant(value) => at(source, key, Property::constant(name, value.si())),
+            Self::Constant(value) => at(source, key, ThermalProperty::constant(name, value.si())),
             Self::Table(table) => {
                 let temperatures = table.temperature.iter().map(|t| t.si()).collect();
                 let values = table.value.iter().map(|v| v.si()).collect();
                 let keys =
                     [(name, "value"), ("number of values", "value"), ("temperature, K", "temperature")];
-                Property::table(name, temperatures, values)
+                ThermalProperty::table(name, temperatures, values)
                     .map_err(|error| located_in(source, key, &keys, &error))
             }
         }

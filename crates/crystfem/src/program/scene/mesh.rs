@@ -4,7 +4,7 @@ use super::fault::{located, located_in};
 use super::memory;
 use super::voxels::{BuiltMesh, PRINTED, PathSpec, StlSpec, box_of};
 use crate::error::Error;
-use crate::mesh::{Bar, Block, Grid, Mesh, Split, Substrate, Tube, quality, read};
+use crate::mesh::{Bar, Block, CellSplit, Grid, Mesh, Substrate, Tube, quality, read};
 use harness::scene::{SceneError, Source};
 use polycore::units::{Angle, Length};
 use serde::Deserialize;
@@ -86,7 +86,7 @@ pub struct BarSpec {
     pub substrate: Option<SubstrateSpec>,
     /// Element type of the grid's cells; default hexahedra.
     #[serde(default)]
-    pub cells: Split,
+    pub cells: CellSplit,
 }
 
 /// See [`Substrate`].
@@ -111,7 +111,7 @@ pub struct BrickSpec {
     pub elements: [usize; 3],
     /// Element type; default hexahedra.
     #[serde(default)]
-    pub cells: Split,
+    pub cells: CellSplit,
 }
 
 /// See [`Tube`].

@@ -3,7 +3,7 @@
 use super::fault::located;
 use super::{MaterialSpec, OutputSpec, Program, check_name};
 use crate::error::Error;
-use crate::history::{History, Leg};
+use crate::history::{Leg, TemperatureHistory};
 use crate::point::{Drive, Stepping};
 use harness::report::Expect;
 use harness::scene::{SceneError, Source};
@@ -304,7 +304,7 @@ impl PointSpec {
             return Ok(Drive::Lumped { start, exchange, duration });
         }
         if let Some(file) = &self.history {
-            let history = History::read(&source.file(file));
+            let history = TemperatureHistory::read(&source.file(file));
             return history.map(Drive::Prescribed).map_err(|error| located(source, &key("history"), &error));
         }
         let cycles = self.cycles.unwrap_or(1);
@@ -316,7 +316,7 @@ impl PointSpec {
             legs.push(leg.leg(source, &key(&format!("legs[{index}]")))?);
         }
         let legs: Vec<Leg> = std::iter::repeat_n(legs, cycles).flatten().collect();
-        History::from_legs(start, &legs)
+        TemperatureHistory::from_legs(start, &legs)
             .map(Drive::Prescribed)
             .map_err(|error: Error| located(source, &key("legs"), &error))
     }

@@ -45,7 +45,7 @@ impl PrintSpec {
         notes.extend(layers.notes);
         let interval = self.layer_time.map_or(0.0, |time| time.si());
         let schedule = self.schedule(source)?;
-        let temperature = |time| schedule.as_ref().map_or(f64::NAN, |schedule| schedule.at(time));
+        let temperature = |time| schedule.as_ref().map_or(f64::NAN, |schedule| schedule.value_at(time));
         Ok(PrintPlan::in_layers(layers.elements, self.start(), interval, temperature))
     }
 
@@ -87,7 +87,7 @@ impl PrintSpec {
         if !table || self.acceleration.is_some() || self.jerk.is_some() {
             tool = file::timed(source, "print", tool, self.acceleration, self.jerk, notes)?;
         }
-        if tool.is_fed() {
+        if tool.has_feed() {
             notes.extend(tool.summary(fed));
         }
         file::leave_out(source, "print", &self.leave_out, &mut tool, notes)?;
@@ -100,15 +100,15 @@ impl PrintSpec {
             tool = tool.centred(mesh, &elements, bead);
         }
         if let Some(offset) = self.offset {
-            tool = tool.shifted(offset.map(|x| x.si()));
+            tool = tool.translated(offset.map(|x| x.si()));
         }
         let mut activation =
-            tool.activation(mesh, &elements, bead).map_err(|error| at("print.path", error))?;
+            tool.activation_times(mesh, &elements, bead).map_err(|error| at("print.path", error))?;
         let volume = |list: &[u32]| list.iter().map(|&element| mesh.volume(element)).sum::<f64>();
         let whole = volume(&elements);
         let share = |list: &[u32]| 100.0 * (1.0 - volume(list) / whole);
         let covered = share(&activation.missed);
-        let outside = 100.0 * tool.outside(mesh, &elements, bead);
+        let outside = 100.0 * tool.fraction_outside(mesh, &elements, bead);
         if covered <= 0.0 || activation.missed.len() == elements.len() {
             let boxed = |bounds: Option<[[f64; 3]; 2]>| {
                 let [low, high] = bounds.unwrap_or_default().map(millimetres);
@@ -134,7 +134,7 @@ impl PrintSpec {
             told += "; what they do not cover is not printed (`fill = true` fills gaps)";
         }
         notes.push(told);
-        let extruded: f64 = tool.printing().map(|one| one.volume(fed)).sum();
+        let extruded: f64 = tool.printing_moves().map(|one| one.volume(fed)).sum();
         if extruded > 0.0 {
             let ratio = (whole - volume(&activation.missed)) / extruded;
             if !(RATIOS[0]..=RATIOS[1]).contains(&ratio) {

@@ -6,11 +6,11 @@ use super::memory;
 use super::part::{BoundarySpec, PartScene};
 use super::places::{elements, millimetres};
 use super::voxels::{BuiltMesh, Filling};
-use crate::boundary::{Condition, Field, Schedule, Source as Heat, Where};
+use crate::boundary::{Condition, FaceSelection, Field, Schedule, Source as Heat};
 use crate::coupling::HealingSettings;
 use crate::material::{ThermalMaterial, fill_elements};
-use crate::mesh::surface::Surface;
-use crate::mesh::{Face, Mesh, Place};
+use crate::mesh::surface::OuterSurface;
+use crate::mesh::{Face, LocatedPoint, Mesh};
 use crate::print_plan::PrintPlan;
 use crate::problem::{Problem, initial_temperatures};
 use crate::simulation::Settings;
@@ -50,9 +50,9 @@ pub struct Task {
     /// Elements of each layer, where there are layers.
     pub layers: Vec<Vec<u32>>,
     /// Where each probe is.
-    pub probes: Vec<Place>,
+    pub probes: Vec<LocatedPoint>,
     /// Where the points of each line are; none outside of the mesh.
-    pub lines: Vec<Vec<Option<Place>>>,
+    pub lines: Vec<Vec<Option<LocatedPoint>>>,
     /// How full elements are, of a mesh of a path or an STL surface.
     pub filling: Option<Filling>,
     /// Stress, where the scene asks for it.
@@ -201,7 +201,7 @@ impl PartScene {
         source: &Source,
         mesh: &Mesh,
         notes: &mut Vec<String>,
-    ) -> Result<Vec<Place>, SceneError> {
+    ) -> Result<Vec<LocatedPoint>, SceneError> {
         let mut places = Vec::new();
         for (index, probe) in self.probe.iter().enumerate() {
             let at = probe.at.map(|x| x.si());
@@ -228,7 +228,7 @@ impl PartScene {
         source: &Source,
         mesh: &Mesh,
         columns: &[String],
-    ) -> Result<Vec<Vec<Option<Place>>>, SceneError> {
+    ) -> Result<Vec<Vec<Option<LocatedPoint>>>, SceneError> {
         LineSpec::check(&self.output.line, source, 3, columns)?;
         let mut lines = Vec::new();
         for (index, line) in self.output.line.iter().enumerate() {
@@ -269,7 +269,7 @@ impl PartScene {
     }
 
     fn conditions(&self, source: &Source, mesh: &Mesh) -> Result<Vec<Condition>, SceneError> {
-        let surface = Surface::of_all(mesh).map_err(|error| located(source, "mesh", &error))?;
+        let surface = OuterSurface::of_all(mesh).map_err(|error| located(source, "mesh", &error))?;
         let faces = |key: &str, name: &str| -> Result<Vec<Face>, SceneError> {
             let region = surface.region(mesh, name);
             region.map(|region| surface.all_in(&region)).map_err(|error| located(source, key, &error))
@@ -313,11 +313,11 @@ impl PartScene {
                         "a box that contains the centre of a face",
                     ));
                 }
-                Where::Faces(inside)
+                FaceSelection::Faces(inside)
             } else if spec.surface == "outer" {
-                Where::Outer { except }
+                FaceSelection::Outer { except }
             } else {
-                Where::Faces(faces(&format!("{key}.surface"), &spec.surface)?)
+                FaceSelection::Faces(faces(&format!("{key}.surface"), &spec.surface)?)
             };
             for condition in spec.conditions(source, &key, mesh, place)? {
                 condition.check().map_err(|error| located_in(source, &key, &CONDITION_KEYS, &error))?;
@@ -369,14 +369,14 @@ impl BoundarySpec {
         source: &Source,
         key: &str,
         mesh: &Mesh,
-        place: Where,
+        place: FaceSelection,
     ) -> Result<Vec<Condition>, SceneError> {
         let of = |name: &str| format!("{key}.{name}");
         let mut conditions = Vec::new();
         if let Some(temperature) = &self.temperature {
             let nodes = match &place {
-                Where::Faces(faces) => mesh.nodes_of(faces),
-                Where::Outer { .. } => Vec::new(),
+                FaceSelection::Faces(faces) => mesh.nodes_of(faces),
+                FaceSelection::Outer { .. } => Vec::new(),
             };
             let value = Field::Uniform(temperature.build(source, &of("temperature"))?);
             conditions.push(Condition::Temperature { nodes, value });

@@ -3,7 +3,7 @@
 use super::either::{self, TextOrTable};
 use super::fault::{located, located_in};
 use crate::boundary::Schedule;
-use crate::table::{Column, read};
+use crate::table::{TableColumn, read};
 use harness::scene::{SceneError, Source};
 use polycore::units::dimension::TimeDimension;
 use polycore::units::{Dimension, Quantity, Time};
@@ -92,7 +92,7 @@ impl<D: Dimension + Copy> ScheduleSpec<D> {
             }
             Some(file) => {
                 let path = source.file(file);
-                let columns = [Column::of::<TimeDimension>("time"), Column::of::<D>("value")];
+                let columns = [TableColumn::new::<TimeDimension>("time"), TableColumn::new::<D>("value")];
                 let [times, values] =
                     read(&path, columns).map_err(|error| located(source, &format!("{key}.file"), &error))?;
                 (times, values)

@@ -62,10 +62,10 @@ impl<D: Dimension + Copy> TimesSpec<D> {
         for (other, acceleration, jerk) in own.into_iter().chain(along) {
             if let (Some(acceleration), Some(jerk), true) = (acceleration, jerk, source.file(other) == file) {
                 let fault = |error| located(source, &format!("{key}.file"), &error);
-                return path.accelerated(acceleration.si(), jerk.si()).map_err(fault);
+                return path.with_acceleration(acceleration.si(), jerk.si()).map_err(fault);
             }
         }
-        Ok(path.as_stated())
+        Ok(path.with_stated_limits())
     }
 
     /// What a bed cools towards, K, and the time constant, s.
@@ -183,7 +183,7 @@ impl ScheduleSpec<TemperatureDimension> {
         let Some(&(time, _)) = pairs.last().filter(|pair| pair.1.is_nan()) else { return Ok(None) };
         let (room, constant) = over.cooling();
         let schedule = Schedule::linear(&bed(&pairs, room, constant));
-        let then = schedule.map_err(|error| located(source, key, &error))?.at(end);
+        let then = schedule.map_err(|error| located(source, key, &error))?.value_at(end);
         Ok((then > room + COLD).then_some((time, then)))
     }
 }
@@ -196,8 +196,9 @@ mod tests {
     /// stops there.
     #[test]
     fn beds_cool() {
-        let at =
-            |pairs: &[(f64, f64)], time: f64| Schedule::linear(&bed(pairs, 20.0, 100.0)).unwrap().at(time);
+        let at = |pairs: &[(f64, f64)], time: f64| {
+            Schedule::linear(&bed(pairs, 20.0, 100.0)).unwrap().value_at(time)
+        };
         let off = [(0.0, 60.0), (10.0, f64::NAN)];
         for (time, exact) in
             [(5.0, 60.0), (110.0, 20.0 + 40.0 / 1f64.exp()), (210.0, 20.0 + 40.0 / 2f64.exp())]

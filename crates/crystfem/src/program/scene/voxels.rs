@@ -4,7 +4,7 @@ use super::fault::{located, located_in};
 use super::file;
 use super::memory;
 use crate::error::Error;
-use crate::mesh::path::{Cells, Deposit, ToolPath, read_gcode};
+use crate::mesh::path::{CellSettings, Deposit, ToolPath, read_gcode};
 use crate::mesh::{Mesh, RATIOS, Voxels, quality, stl};
 use harness::scene::{SceneError, Source};
 use polycore::units::{Acceleration, Length, Speed};
@@ -123,7 +123,7 @@ impl PathSpec {
             path = path.with_heights(filament, height);
         }
         file::leave_out(source, block, &self.leave_out, &mut path, &mut notes)?;
-        let cells = Cells {
+        let cells = CellSettings {
             size: self.cell.map(|x| x.si()),
             filament,
             height,
@@ -207,7 +207,7 @@ fn finish(
 ) -> Result<BuiltMesh, SceneError> {
     let cubic = 1e9 * voxels.volume;
     let told = format!("cells have {:.4} times the volume of the body, {cubic:.3} mm³", voxels.ratio);
-    if !fill && !voxels.may_be_full() {
+    if !fill && !voxels.can_be_full() {
         let [low, high] = RATIOS;
         let allowed = format!("{low} to {high} times with full cells: smaller ones, or `fill = true`");
         return Err(source.error(&format!("{block}.cell"), told, allowed));

@@ -1,42 +1,42 @@
-//! What slicers say in comments: features, heights, layers, estimates, settings.
+//! Comments of slicers: features, heights, layers, estimates, settings.
 
-use super::feature::BEFORE;
+use super::feature::BEFORE_FIRST_LAYER;
 use super::limits::Limits;
 
-/// Name of a feature before any is named.
+/// Feature before any is named.
 const NONE: &str = "";
-/// What the command line of Cura writes where it has not estimated, s.
+/// Placeholder of Cura's command line for a missing estimate, s.
 const PLACEHOLDER: f64 = 6666.0;
 
-/// What comments have said so far.
+/// State read from comments.
 #[derive(Debug)]
-pub(super) struct Remarks {
+pub(super) struct Comments {
     /// Names of features.
     pub features: Vec<String>,
-    /// The present one.
+    /// Current feature.
     pub feature: u16,
-    /// Height of beads, m; 0 where none is said.
+    /// Bead height, m; 0 if not stated.
     height: f64,
-    /// Marks of layers.
+    /// Number of layer marks.
     pub layers: usize,
-    /// How long the slicer says that the print takes, s; rank 0 from the first layer on.
+    /// Print time estimated by the slicer, s, with rank 0 from the first layer on.
     pub estimate: Option<(u8, f64)>,
-    /// What a change of filament takes, s.
+    /// Duration of a filament change, s.
     pub change: f64,
-    /// Whether E is a volume throughout.
+    /// True if E is a volume throughout.
     pub volumetric: bool,
-    /// Diameters of filaments, m, tool by tool.
+    /// Diameters of filaments, m, by tool.
     pub filaments: Vec<f64>,
-    /// Of a printer whose part fan is P1.
+    /// True for a Bambu printer, whose part fan is P1.
     pub bambu: bool,
-    /// RepRapFirmware: velocities per minute.
+    /// True for RepRapFirmware, with velocities per minute.
     pub per_minute: bool,
-    /// Whether the slicer left the machine's limits out.
+    /// True if the slicer ignored the machine's limits.
     pub limits_ignored: bool,
 }
 
-impl Remarks {
-    /// `marked`: the file marks its layers.
+impl Comments {
+    /// Returns the initial state; `marked` if the file marks its layers.
     pub fn new(marked: bool) -> Self {
         let mut new = Self {
             features: vec![NONE.to_owned()],
@@ -52,12 +52,12 @@ impl Remarks {
             limits_ignored: false,
         };
         if marked {
-            new.name(BEFORE);
+            new.name(BEFORE_FIRST_LAYER);
         }
         new
     }
 
-    /// Height of the beads that follow, m; 0 where no comment tells, as in a printer's own code.
+    /// Height of the beads that follow, m; 0 if no comment states it, as in a printer's own code.
     pub fn height(&self) -> f64 {
         let own =
             self.features.get(usize::from(self.feature)).is_some_and(|name| super::feature::is_purge(name));
@@ -67,7 +67,7 @@ impl Remarks {
     fn name(&mut self, name: &str) {
         let known = self.features.iter().position(|other| other.eq_ignore_ascii_case(name));
         let at = known.unwrap_or_else(|| {
-            // a file with more names than this is none of a slicer
+            // no slicer writes more names than this
             if self.features.len() < 1000 {
                 self.features.push(name.to_owned());
             }
@@ -78,7 +78,7 @@ impl Remarks {
 
     fn layer(&mut self) {
         self.layers += 1;
-        // what a printer's own code laid ends here; a slicer names what follows
+        // the printer's own code ends here; the slicer names the following features
         let own =
             self.features.get(usize::from(self.feature)).is_some_and(|name| super::feature::is_purge(name));
         if own {
@@ -86,7 +86,7 @@ impl Remarks {
         }
     }
 
-    /// Takes in a comment, without its `;`.
+    /// Reads a comment, without its `;`.
     pub fn read(&mut self, comment: &str, limits: &mut Limits) {
         let text = comment.trim();
         let after = |names: &[&str]| {
@@ -143,8 +143,8 @@ impl Remarks {
     }
 }
 
-/// Whether a comment begins a layer: PrusaSlicer, SuperSlicer, OrcaSlicer; Bambu Studio; Cura, ideaMaker;
-/// Simplify3D.
+/// Returns true if a comment begins a layer: PrusaSlicer, SuperSlicer, OrcaSlicer; Bambu Studio; Cura,
+/// ideaMaker; Simplify3D.
 pub(super) fn is_layer(text: &str) -> bool {
     let numbered = |prefix: &str| {
         let rest = text.strip_prefix(prefix).map(str::trim_start);
@@ -156,7 +156,7 @@ pub(super) fn is_layer(text: &str) -> bool {
         || (numbered("layer ") && text.contains("Z ="))
 }
 
-/// Seconds of an estimate, and its rank: 0 from the first layer on, 1 of all.
+/// Parses an estimate, s, and its rank: 0 from the first layer on, 1 for the whole print.
 fn estimate(text: &str) -> Option<(u8, f64)> {
     if let Some(rest) = text.strip_prefix("TIME:").or_else(|| text.strip_prefix("Print Time:")) {
         return rest.trim().parse().ok().filter(|s: &f64| *s > 0.0 && *s != PLACEHOLDER).map(|s| (1, s));
@@ -173,7 +173,7 @@ fn estimate(text: &str) -> Option<(u8, f64)> {
     duration(value).map(|seconds| (1, seconds))
 }
 
-/// `1d 2h 3m 4s`, or with words (`2 hours 3 minutes`).
+/// Parses `1d 2h 3m 4s`, or the same with words (`2 hours 3 minutes`).
 fn duration(text: &str) -> Option<f64> {
     let mut seconds = 0.0;
     let mut rest = text.trim();

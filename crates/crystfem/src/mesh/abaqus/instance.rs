@@ -1,22 +1,22 @@
-//! Where an instance of a part is.
+//! Position of a part instance.
 
 use nalgebra::{Rotation3, Unit, Vector3};
 
-use super::cards::{Cards, Row};
+use super::cards::{Cards, DataLine};
 use crate::error::Error;
 
-/// A translation, then a rotation about a line (Abaqus Keywords Guide, `*INSTANCE`).
+/// Position of an instance: a translation, then a rotation about a line (Abaqus Keywords Guide, `*INSTANCE`).
 #[derive(Debug)]
-pub(super) struct Place {
+pub(super) struct InstancePosition {
     shift: Vector3<f64>,
-    /// A point of the line, and the turn about it.
+    /// A point of the line, and the rotation about it.
     turn: Option<(Vector3<f64>, Rotation3<f64>)>,
 }
 
-impl Place {
-    /// Data lines: x, y, z; then two points of the line and an angle in degrees. `None` without any.
+impl InstancePosition {
+    /// Reads data lines: x, y, z; then two points of the line and an angle in degrees. `None` without any.
     pub fn read(cards: &mut Cards) -> Result<Option<Self>, Error> {
-        let numbers = |row: &Row, allowed: &str, count: usize| -> Result<Vec<f64>, Error> {
+        let numbers = |row: &DataLine, allowed: &str, count: usize| -> Result<Vec<f64>, Error> {
             let words = row.words();
             if words.len() > count {
                 return Err(row.error("place of an instance", row.text(), allowed));
@@ -38,8 +38,8 @@ impl Place {
         Ok(Some(Self { shift, turn: Some((a, Rotation3::from_axis_angle(&axis, line[6].to_radians()))) }))
     }
 
-    /// Where a point of the part is.
-    pub fn of(&self, point: [f64; 3]) -> [f64; 3] {
+    /// Transforms a point of the part.
+    pub fn transform(&self, point: [f64; 3]) -> [f64; 3] {
         let moved = Vector3::from(point) + self.shift;
         self.turn.as_ref().map_or(moved, |(at, turn)| at + turn * (moved - at)).into()
     }

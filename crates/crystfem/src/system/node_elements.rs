@@ -1,22 +1,22 @@
-//! The elements around nodes, and which of their sides are outside.
+//! Elements around nodes, and their outer sides.
 
 use super::NONE;
 use crate::mesh::{Face, Mesh};
 use polycore::numerics::Groups;
 use rayon::prelude::*;
 
-/// Elements whose sides are looked at together.
+/// Number of elements whose sides are examined together.
 const BATCH: usize = 4096;
 
-/// The elements around each node of a mesh, ascending, as `stride` × element + number of the node in it.
-pub struct Around {
+/// Elements around each node of a mesh, ascending, as `stride` × element + local number of the node.
+pub struct NodeElements {
     corners: Groups<u32>,
-    /// 8, or 32 of a mesh with second-order elements.
+    /// Stride: 8, or 32 for a mesh with second-order elements.
     stride: u32,
 }
 
-impl Around {
-    /// Of all elements that ever exist.
+impl NodeElements {
+    /// Collects all elements that ever exist.
     pub fn new(mesh: &Mesh, absent: &[u32]) -> Self {
         let stride = if mesh.is_second_order() { 32 } else { 8 };
         let mut exists = vec![true; mesh.element_count()];
@@ -28,8 +28,8 @@ impl Around {
         Self { corners: Groups::new(mesh.points.len(), corners), stride }
     }
 
-    /// Elements of a node that are born, and its number in each.
-    pub fn of(&self, node: u32, born: &[u32]) -> impl Iterator<Item = (u32, usize)> {
+    /// Born elements of a node, with the local number of the node.
+    pub fn elements_of(&self, node: u32, born: &[u32]) -> impl Iterator<Item = (u32, usize)> {
         let stride = self.stride;
         self.corners
             .group(node as usize)
@@ -38,7 +38,8 @@ impl Around {
             .filter(|&(element, _)| born[element as usize] != NONE)
     }
 
-    /// Sides of these elements that have a node of those wanted and that no other element shares, in the order of the elements.
+    /// Sides of these elements that contain a wanted node and are not shared with another element, in the
+    /// order of the elements.
     pub fn outer(
         &self,
         mesh: &Mesh,
@@ -50,7 +51,7 @@ impl Around {
             (0..mesh.side_count(element)).map(move |side| Face { element, side }).filter(|&face| {
                 let corners = mesh.face_nodes(face);
                 corners.iter().any(|&node| wanted(node))
-                    && !self.of(corners[0], born).any(|(other, _)| {
+                    && !self.elements_of(corners[0], born).any(|(other, _)| {
                         let others = mesh.nodes(other);
                         other != face.element && corners[1..].iter().all(|corner| others.contains(corner))
                     })

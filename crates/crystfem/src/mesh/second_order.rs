@@ -1,11 +1,12 @@
-//! Second-order elements from first-order ones.
+//! Conversion of first-order to second-order elements.
 
 use super::{Cell, Mesh};
 use std::collections::HashMap;
 
 impl Mesh {
-    /// The same mesh with second-order elements: a new node on the middle of each edge, straight edges. Node sets take the new
-    /// nodes between two of theirs; elements that are of second order stay. Elements keep their numbers.
+    /// Converts to second-order elements with straight edges: a new node on the middle of each edge. Node
+    /// sets gain the new nodes between two of theirs; second-order elements stay. Elements keep their
+    /// numbers.
     pub fn second_order(self) -> Self {
         let elements: Vec<u32> = (0..self.element_count() as u32).collect();
         let mut mesh =
@@ -38,19 +39,19 @@ impl Mesh {
 
 #[cfg(test)]
 mod tests {
-    use crate::mesh::{Block, Grid, Split, quality};
+    use crate::mesh::{Block, CellSplit, Grid, quality};
 
     #[test]
     fn every_edge_has_one_node() {
         let grid = Grid::uniform([0.0; 3], [3.0, 2.0, 2.0], [3, 2, 2]).unwrap();
         let block = [Block { name: "brick".into(), lower: [0.0; 3], upper: [3.0, 2.0, 2.0] }];
-        // edges of the grid, of the diagonals of its squares (each once), of its cells
+        // edges of the grid, of the diagonals of its squares (once each), of its cells
         let edges = 3 * 9 + 2 * 4 * 3 + 2 * 4 * 3;
         let (x, y, z) = (4 * 4, 3 * 3 * 2, 3 * 3 * 2);
         for (split, more, left) in [
-            (Split::Hexahedra, 0, 9 + 12),
-            (Split::Wedges, 3 * 2 * 3, 9 + 12),
-            (Split::SixTetrahedra, x + y + z + 12, 9 + 12 + 4),
+            (CellSplit::Hexahedra, 0, 9 + 12),
+            (CellSplit::Wedges, 3 * 2 * 3, 9 + 12),
+            (CellSplit::SixTetrahedra, x + y + z + 12, 9 + 12 + 4),
         ] {
             let mesh = grid.blocks(&block, split).unwrap();
             let [nodes, elements] = [mesh.points.len(), mesh.element_count()];

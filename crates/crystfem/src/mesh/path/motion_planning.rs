@@ -1,12 +1,12 @@
-//! Times of moves of a machine that cannot change its velocity at once.
+//! Motion planning of a machine with limited acceleration.
 
 use super::limits::{Limits, Ramp};
-use super::{Motion, ToolPath};
+use super::{MachineMotion, ToolPath};
 use crate::error::Error;
 use nalgebra::Vector3;
 
-/// Durations of motions one after another, s, by trapezoids of velocity from rest to rest: passes back and
-/// forth give the velocity at each corner. `exit`: the velocity of the last at its end.
+/// Durations of consecutive motions, s, by trapezoids of velocity from rest: backward and forward passes give
+/// the velocity at each corner. `exit` is the final velocity.
 fn durations(ramps: &[Ramp], exit: f64) -> Vec<f64> {
     let mut corner: Vec<f64> = ramps.iter().map(|ramp| ramp.enter).collect();
     corner.push(exit);
@@ -31,13 +31,14 @@ fn durations(ramps: &[Ramp], exit: f64) -> Vec<f64> {
 }
 
 impl ToolPath {
-    /// The same path with trapezoidal velocities: along each move the velocity changes by `acceleration` at most, m/s², and
-    /// from move to move by `jerk` along each axis, m/s (as Marlin's classic jerk). Waits, and filament
-    /// alone, keep their time and let velocity pass. Velocity is even along each move of the result.
+    /// Applies trapezoidal velocities: along each move the velocity changes by at most `acceleration`, m/s²,
+    /// and from move to move by at most `jerk` along each axis, m/s (as Marlin's classic jerk). Dwells and
+    /// feed-only motions keep their duration and do not interrupt the velocity. The result has constant
+    /// velocity along each move.
     ///
     /// # Errors
-    /// An acceleration or a jerk that is not positive.
-    pub fn accelerated(mut self, acceleration: f64, jerk: f64) -> Result<Self, Error> {
+    /// [`Error::Parameter`] for an acceleration or a jerk that is not positive.
+    pub fn with_acceleration(mut self, acceleration: f64, jerk: f64) -> Result<Self, Error> {
         for (name, found) in [("acceleration", acceleration), ("jerk", jerk)] {
             if !(found > 0.0 && found.is_finite()) {
                 return Err(Error::Parameter { name, found, allowed: "positive and finite".into() });
@@ -64,9 +65,9 @@ impl ToolPath {
         Ok(self)
     }
 
-    /// The same path with the limits that its file states, filament alone too: with each axis' velocity,
-    /// acceleration and jerk, or the deviation at junctions, of their time in the file. Waits are stops.
-    pub fn as_stated(mut self) -> Self {
+    /// Applies the limits stated in the file at each time, for feed-only motions too: velocity, acceleration
+    /// and jerk of each axis, or junction deviation. Dwells are stops.
+    pub fn with_stated_limits(mut self) -> Self {
         let mut last: Option<(Ramp, [f64; 4])> = None;
         let (mut ramps, mut kept): (Vec<Ramp>, Vec<usize>) = Default::default();
         for (k, motion) in self.motions.iter().enumerate() {
@@ -87,16 +88,16 @@ impl ToolPath {
         self
     }
 
-    /// The limits that the file states, in a line; `None` where it states none of motion.
+    /// Describes the limits stated in the file in a line; `None` without limits of motion.
     pub fn describe_limits(&self) -> Option<String> {
-        let acts = |motion: &Motion| self.limits[motion.limits as usize].stated;
+        let acts = |motion: &MachineMotion| self.limits[motion.limits as usize].stated;
         let last = self.motions.iter().rfind(|motion| acts(motion))?;
         Some(self.limits[last.limits as usize].describe())
     }
 
-    /// Gives motions, with start and end of each, s, new durations; all else keeps its own.
+    /// Assigns new durations to motions, given by start and end, s; everything else keeps its own.
     fn retime(&mut self, moved: &[[f64; 3]]) {
-        // by how much all is later from the end of a motion on
+        // delay of everything from the end of a motion on
         let mut shift = Vec::with_capacity(moved.len());
         let mut late = 0.0;
         for [start, end, took] in moved {

@@ -1,35 +1,35 @@
-//! Elements of all kinds.
+//! Element kinds of the mechanics.
 
-use super::element::{Hexahedron, Modal, POINTS, Six, Wide};
+use super::element::{ElementVector, GAUSS_POINTS, Hexahedron, ModalVector, VoigtVector};
 use super::tetrahedron::{self, Tetrahedron};
 
-/// Nodes of an element at most.
-pub const MOST: usize = 10;
+/// Maximum number of nodes of an element.
+pub const MAX_NODES_PER_ELEMENT: usize = 10;
 /// A hexahedron of 8 nodes, or a tetrahedron of 4 or 10.
 #[derive(Clone, Debug)]
-pub enum Element {
-    /// 8 nodes, 8 Gauss points.
+pub enum MechanicalElement {
+    /// Hexahedron of 8 nodes and 8 Gauss points.
     Hexahedron(Box<Hexahedron>),
-    /// 4 nodes and 1 Gauss point, or 10 and 4.
+    /// Tetrahedron of 4 nodes and 1 Gauss point, or of 10 and 4.
     Tetrahedron(Box<Tetrahedron>),
 }
 
-/// Returns whether stress can be computed in an element of this number of nodes.
+/// Returns true if stress can be computed in elements with this number of nodes.
 pub fn is_known(nodes: usize) -> bool {
     matches!(nodes, 4 | 8 | 10)
 }
 
-/// Number of Gauss points of an element of so many nodes.
+/// Number of Gauss points of an element with `nodes` nodes.
 pub fn points(nodes: usize) -> usize {
     match nodes {
         4 => 1,
         10 => 4,
-        _ => POINTS,
+        _ => GAUSS_POINTS,
     }
 }
 
-/// Shares of the nodes at a Gauss point of an element of so many nodes.
-pub fn shares(nodes: usize, point: usize) -> [f64; MOST] {
+/// Shape functions at a Gauss point of an element with `nodes` nodes.
+pub fn shares(nodes: usize, point: usize) -> [f64; MAX_NODES_PER_ELEMENT] {
     if nodes != 8 {
         return tetrahedron::shares(nodes, point);
     }
@@ -37,7 +37,7 @@ pub fn shares(nodes: usize, point: usize) -> [f64; MOST] {
     std::array::from_fn(|node| own.get(node).copied().unwrap_or(0.0))
 }
 
-/// Elements of one shape have one key: their edges to 1e-12 of their size.
+/// Key of a shape: the edges to 1e-12 of their size; equal for elements of the same shape.
 pub fn key(places: &[[f64; 3]]) -> Vec<i64> {
     if let Ok(corners) = <&[[f64; 3]; 8]>::try_from(places) {
         return Hexahedron::key(corners);
@@ -51,8 +51,8 @@ pub fn key(places: &[[f64; 3]]) -> Vec<i64> {
     edges.chain([(size * 1e15).round() as i64]).collect()
 }
 
-impl Element {
-    /// Builds the element of 8, 4 or 10 nodes, m; `None` of others, and where it is turned inside out.
+impl MechanicalElement {
+    /// Computes an element from 8, 4 or 10 node positions, m; `None` for other numbers, or if inverted.
     pub fn new(places: &[[f64; 3]], poisson: f64) -> Option<Self> {
         match places.len() {
             8 => Hexahedron::new(places.first_chunk()?, poisson).map(|own| Self::Hexahedron(Box::new(own))),
@@ -69,7 +69,7 @@ impl Element {
         }
     }
 
-    /// K̂ over the modulus, without what is condensed, column by column.
+    /// Condensed stiffness K̂ over the modulus, column by column.
     pub fn condensed(&self) -> &[f64] {
         match self {
             Self::Hexahedron(own) => own.condensed.as_slice(),
@@ -77,29 +77,34 @@ impl Element {
         }
     }
 
-    /// σ over the modulus of an elastic strain.
-    pub fn stress(&self, strain: &Six) -> Six {
+    /// Stress over the modulus, from an elastic strain.
+    pub fn stress(&self, strain: &VoigtVector) -> VoigtVector {
         match self {
             Self::Hexahedron(own) => own.stress(strain),
             Self::Tetrahedron(own) => own.stress(strain),
         }
     }
 
-    /// See [`Hexahedron::forces`].
-    pub fn forces(&self, stresses: &[Six; POINTS]) -> (Wide, Modal) {
+    /// Nodal and modal forces, see [`Hexahedron::forces`].
+    pub fn forces(&self, stresses: &[VoigtVector; GAUSS_POINTS]) -> (ElementVector, ModalVector) {
         match self {
             Self::Hexahedron(own) => {
                 let (nodal, modal) = own.forces(stresses);
-                let mut all = Wide::zeros();
+                let mut all = ElementVector::zeros();
                 all.fixed_rows_mut::<24>(0).copy_from(&nodal);
                 (all, modal)
             }
-            Self::Tetrahedron(own) => (own.forces(stresses), Modal::zeros()),
+            Self::Tetrahedron(own) => (own.forces(stresses), ModalVector::zeros()),
         }
     }
 
-    /// See [`Hexahedron::strains`].
-    pub fn strains(&self, displacement: &Wide, modal: &Modal, modulus: f64) -> [Six; POINTS] {
+    /// Strain increments, see [`Hexahedron::strains`].
+    pub fn strains(
+        &self,
+        displacement: &ElementVector,
+        modal: &ModalVector,
+        modulus: f64,
+    ) -> [VoigtVector; GAUSS_POINTS] {
         match self {
             Self::Hexahedron(own) => {
                 own.strains(&displacement.fixed_rows::<24>(0).into_owned(), modal, modulus)
@@ -108,8 +113,8 @@ impl Element {
         }
     }
 
-    /// Half the curl of nodal displacements in the middle, rad.
-    pub fn rotation(&self, displacement: &Wide) -> [f64; 3] {
+    /// Rotation at the centre by nodal displacements, half their curl, rad.
+    pub fn rotation(&self, displacement: &ElementVector) -> [f64; 3] {
         match self {
             Self::Hexahedron(own) => own.rotation(&displacement.fixed_rows::<24>(0).into_owned()),
             Self::Tetrahedron(own) => own.rotation(displacement),

@@ -1,48 +1,48 @@
-//! Version 2 of the format: nodes one by one, elements with their tags
+//! Version 2 of the format: a list of nodes, and elements with their tags
 //! (<https://gmsh.info/doc/texinfo/gmsh.html#MSH-file-format-version-2-_0028Legacy_0029>).
 
 use std::collections::HashMap;
 
-use super::{Kind, Numbers, Reader, kind_of, place, whole};
+use super::{ElementKind, MshReader, Numbers, kind_of, place, read_label};
 use crate::error::Error;
-use crate::mesh::file_mesh::Node;
+use crate::mesh::file_mesh::FileNode;
 
-/// Tags of an element at most: a group, an entity, partitions.
-const TAGS: i64 = 10_000;
+/// Limit on the tags of an element: groups, an entity, partitions.
+const MAX_TAGS: i64 = 10_000;
 
-impl Reader {
-    pub(super) fn nodes_of_two(&mut self, numbers: &mut Numbers) -> Result<(), Error> {
+impl MshReader {
+    pub(super) fn nodes_version2(&mut self, numbers: &mut Numbers) -> Result<(), Error> {
         for _ in 0..count(numbers, "number of nodes")? {
-            let (label, point) = (whole(numbers, "number of a node")?, place(numbers)?);
-            self.content.nodes.push(Node { label, line: numbers.line(), point });
+            let (label, point) = (read_label(numbers, "number of a node")?, place(numbers)?);
+            self.content.nodes.push(FileNode { label, line: numbers.line(), point });
         }
         Ok(())
     }
 
-    /// Solids that are there once in each of their groups become one.
-    pub(super) fn elements_of_two(&mut self, numbers: &mut Numbers) -> Result<(), Error> {
+    /// Reads elements; solids repeated for each of their groups become one.
+    pub(super) fn elements_version2(&mut self, numbers: &mut Numbers) -> Result<(), Error> {
         let (all, mut read, mut again) = (count(numbers, "number of elements")?, 0, 0);
         let mut known: HashMap<Vec<u64>, u32> = HashMap::new();
         while read < all {
-            // bytes come in blocks of one type
+            // binary elements come in blocks of one type
             let binary = numbers.is_binary();
             let (mut label, mut block) = (0, 1);
             if !binary {
-                label = whole(numbers, "number of an element")?;
+                label = read_label(numbers, "number of an element")?;
             }
             let code = numbers.int("type of an element")?;
             let kind = kind_of(numbers, code)?;
             if binary {
-                block = whole(numbers, "elements of one type")?;
+                block = read_label(numbers, "elements of one type")?;
             }
             let tags = numbers.int("number of tags")?;
-            if !(0..=TAGS).contains(&tags) || block == 0 || block > all - read {
+            if !(0..=MAX_TAGS).contains(&tags) || block == 0 || block > all - read {
                 let found = format!("{block} elements with {tags} tags");
                 return Err(numbers.error("elements", found, format!("1 to {} with tags", all - read)));
             }
             for _ in 0..block {
                 if binary {
-                    label = whole(numbers, "number of an element")?;
+                    label = read_label(numbers, "number of an element")?;
                 }
                 let mut group = 0;
                 for tag in 0..tags {
@@ -50,7 +50,9 @@ impl Reader {
                     // the sign is an orientation
                     group = if tag == 0 { value.abs() } else { group };
                 }
-                self.element(numbers, label, code, kind, |numbers| whole(numbers, "node of an element"))?;
+                self.element(numbers, label, code, kind, |numbers| {
+                    read_label(numbers, "node of an element")
+                })?;
                 let mut own = self.content.elements.len() as u32 - 1;
                 if kind.solid().is_some() {
                     let first = self.content.elements[own as usize].first;
@@ -77,17 +79,17 @@ impl Reader {
     }
 }
 
-/// A count on a line of its own, text in binary files too.
+/// Reads a count on its own line, text in binary files too.
 fn count(numbers: &mut Numbers, what: &str) -> Result<u64, Error> {
     let line = numbers.text_line();
     line.trim().parse().map_err(|_| numbers.error(what, line, "a count"))
 }
 
-fn dimension(kind: Kind) -> i64 {
+fn dimension(kind: ElementKind) -> i64 {
     match kind {
-        Kind::Solid(_) => 3,
-        Kind::Point => 0,
-        Kind::Line | Kind::Line3 => 1,
+        ElementKind::Solid(_) => 3,
+        ElementKind::Point => 0,
+        ElementKind::Line | ElementKind::Line3 => 1,
         _ => 2,
     }
 }
