@@ -159,6 +159,14 @@ impl Report {
         }
     }
 
+    /// Returns a scalar with six digits, and its unit; empty if there is none of that name.
+    pub fn shown(&self, name: &str) -> (String, String) {
+        match self.values.get(name) {
+            Some(Value::Scalar { value, unit }) => (number::short(*value), unit.clone()),
+            _ => Default::default(),
+        }
+    }
+
     /// Judges expectations against the values so far, replacing earlier judgements; with `quick`, those marked
     /// `quick = false` are left out.
     pub fn judge(&mut self, expectations: &[Expect], quick: bool) -> &mut Self {

@@ -56,6 +56,9 @@ pub const SWEEP: &str = "sweep";
 /// The table of a scene that names the scenes whose results it reads; the harness reads it, programs do not.
 pub const INPUTS: &str = "inputs";
 
+/// The table of a scene that names the values to show first; the harness reads it, programs do not.
+pub const REPORT: &str = "report";
+
 /// A larger file is not a scene; numbers in bulk belong into CSV files beside it.
 pub const LARGEST_FILE: u64 = 16 << 20;
 
@@ -131,7 +134,8 @@ impl Source {
         root.get_mut().remove("version");
         self.overlay(root.get_mut())?;
         root.get_mut().remove(INPUTS);
-        T::deserialize(Deserializer::from(root)).map_err(|error| {
+        let report = root.get_mut().remove(REPORT).map_or(Ok(()), check_report);
+        report.and_then(|()| T::deserialize(Deserializer::from(root))).map_err(|error| {
             // the first tree went into the deserializer; errors are rare, so parse once more
             match DeTable::parse(&self.text) {
                 Ok(root) => {
@@ -218,6 +222,18 @@ impl Source {
         };
         if known { Ok(()) } else { Err(SceneError::bad_version(self, value.span())) }
     }
+}
+
+/// The table `[report]`.
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ReportSpec {
+    #[serde(rename = "values")]
+    _values: Vec<String>,
+}
+
+fn check_report(table: Spanned<DeValue<'_>>) -> Result<(), toml::de::Error> {
+    ReportSpec::deserialize(toml::de::ValueDeserializer::from(table)).map(drop)
 }
 
 /// The fault of the key `program` alone: where the scene is another program's, all other keys are, too.

@@ -7,6 +7,7 @@ mod cli;
 mod folder;
 mod inputs;
 mod rows;
+mod summary;
 mod sweep;
 pub mod terminal;
 
@@ -15,6 +16,7 @@ pub use folder::{RunLock, lock_run, prepare_run, remove_unfinished, resume_run, 
 pub use inputs::{Input, InputState, attached, input_state, inputs};
 use rows::fits;
 pub use rows::{Row, Rows, STATISTICS};
+pub(crate) use summary::main_names;
 pub use sweep::{
     OF_SAMPLES, OF_SWEEPS, Part, Sample, Search, Shard, SweepOptions, Vary, drawn, job, search, sweep,
 };
@@ -192,13 +194,32 @@ impl<'a> Options<'a> {
 pub struct Finished {
     /// What is in `report.json`.
     pub report: Report,
-    /// What the user is shown of it.
+    /// All values, for `--verbose`.
     pub text: String,
+    /// The table of main values, where the harness should not choose it.
+    pub table: Option<String>,
+    /// Warnings and remarks, which are always shown.
+    pub notes: Vec<String>,
+}
+
+impl Finished {
+    /// Returns a finished run with all its values as text.
+    pub fn new(report: Report, text: String) -> Self {
+        Self { report, text, table: None, notes: Vec::new() }
+    }
+
+    /// Adds the warnings and remarks in the lines of a text, which are part of [`Self::text`] too.
+    #[must_use]
+    pub fn with_notes(mut self, notes: &str) -> Self {
+        self.notes.extend(notes.lines().map(str::to_owned));
+        self
+    }
 }
 
 impl From<Report> for Finished {
     fn from(report: Report) -> Self {
-        Self { text: report.table(), report }
+        let text = report.table();
+        Self::new(report, text)
     }
 }
 

@@ -207,7 +207,7 @@ pub(super) fn fits(pattern: &str, name: &str) -> bool {
 }
 
 /// A name's pieces of text and numbers, so that `layer-10` comes after `layer-9`.
-fn natural(name: &str) -> Vec<(String, u64)> {
+pub(super) fn natural(name: &str) -> Vec<(String, u64)> {
     let mut pieces = Vec::new();
     let mut rest = name;
     while !rest.is_empty() {

@@ -141,7 +141,7 @@ pub fn sweep<C: Case>(
     options: &mut SweepOptions,
 ) -> Result<Finished, Failure<C::Error>> {
     let (rows, bands, report) = rows::<C>(source, vary, options)?;
-    Ok(Finished { text: rows.text() + &bands, report })
+    Ok(Finished::new(report, rows.text() + &bands))
 }
 
 /// [`sweep`], and its rows: those requested first, in their order. And the bands of what was sampled.

@@ -43,6 +43,87 @@ pub fn complain(text: impl Display) {
     let _ = write!(std::io::stderr(), "{text}");
 }
 
+/// Longest line of a summary, in columns.
+const WIDTH: usize = 100;
+
+/// Colours and width of standard output.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Style {
+    colors: bool,
+    /// Columns that a line may take.
+    pub width: usize,
+}
+
+impl Style {
+    /// Returns the style of standard output: no colours if it is no terminal or `NO_COLOR` is set.
+    pub fn of_output() -> Self {
+        let terminal = std::io::stdout().is_terminal();
+        let size = console::Term::stdout().size_checked().filter(|_| terminal);
+        let width = size.map_or(WIDTH, |(_, columns)| usize::from(columns).clamp(40, WIDTH));
+        Self { colors: terminal && std::env::var_os("NO_COLOR").is_none(), width }
+    }
+
+    /// Returns the style of a file.
+    #[cfg(test)]
+    pub fn plain() -> Self {
+        Self { colors: false, width: WIDTH }
+    }
+
+    fn paint(&self, code: u8, text: &str) -> String {
+        match self.colors && !text.is_empty() {
+            true => format!("\x1b[{code}m{text}\x1b[0m"),
+            false => text.to_owned(),
+        }
+    }
+
+    pub fn bold(&self, text: &str) -> String {
+        self.paint(1, text)
+    }
+
+    pub fn red(&self, text: &str) -> String {
+        self.paint(31, text)
+    }
+
+    pub fn green(&self, text: &str) -> String {
+        self.paint(32, text)
+    }
+
+    pub fn yellow(&self, text: &str) -> String {
+        self.paint(33, text)
+    }
+
+    /// Cuts a line to the width.
+    pub fn fitted(&self, line: &str) -> String {
+        match line.char_indices().nth(self.width) {
+            Some(_) => line.chars().take(self.width - 1).chain("…".chars()).collect(),
+            None => line.to_owned(),
+        }
+    }
+
+    /// Breaks a line between words; further lines are indented.
+    pub fn wrapped(&self, line: &str) -> String {
+        if line.chars().count() <= self.width {
+            return format!("{line}\n");
+        }
+        let indent = line.len() - line.trim_start().len();
+        let mut text = " ".repeat(indent);
+        let mut column = indent;
+        for word in line.split_whitespace() {
+            let length = word.chars().count();
+            if column > indent && column + 1 + length > self.width {
+                text += &format!("\n{}", " ".repeat(indent + 2));
+                column = indent + 2;
+            } else if column > indent {
+                text.push(' ');
+                column += 1;
+            }
+            text += word;
+            column += length;
+        }
+        text + "\n"
+    }
+}
+
 /// The exit code of a command that tells whether it passed; a failure is printed.
 pub fn exit<E: Fault>(result: Result<bool, Failure<E>>) -> ExitCode {
     match result {
@@ -199,6 +280,15 @@ mod tests {
         let Verb::Run { every, quick } =
             <Line as clap::FromArgMatches>::from_arg_matches(&matches).unwrap().verb;
         assert_eq!((every, quick), (2.0, true));
+    }
+
+    #[test]
+    fn lines_are_broken_between_words() {
+        let style = Style { colors: false, width: 12 };
+        assert_eq!(style.wrapped("  one two three four"), "  one two\n    three\n    four\n");
+        assert_eq!(style.fitted("one two three four"), "one two thr…");
+        assert_eq!(style.red("x"), "x");
+        assert_eq!(Style { colors: true, width: 12 }.red("x"), "\x1b[31mx\x1b[0m");
     }
 
     #[test]

@@ -68,6 +68,18 @@ impl Kind {
         Self::Regression,
     ];
 
+    /// Returns its name in running text, in the plural.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::ClosedForm => "closed forms",
+            Self::Published => "published figures",
+            Self::IndependentProgram => "figures of independent programs",
+            Self::Convergence => "convergence",
+            Self::Bound => "bounds",
+            Self::Regression => "earlier figures",
+        }
+    }
+
     /// Whether a verdict may rest on it: everything but our own earlier figures.
     pub fn is_evidence(self) -> bool {
         self != Self::Regression

@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use sha2::{Digest, Sha256};
 use toml::de::{DeTable, DeValue};
 
-use super::{INPUTS, SceneError, Source};
+use super::{INPUTS, REPORT, SceneError, Source};
 use crate::report::{FILE_NAME, Report};
 use crate::stamp::{InputStamp, Stamp};
 
@@ -166,6 +166,24 @@ impl Source {
     pub fn program(&self) -> Option<String> {
         let root = DeTable::parse(&self.text).ok()?;
         Some(root.get_ref().get("program")?.get_ref().as_str()?.to_owned())
+    }
+
+    /// Returns the title of the scene, if it has one.
+    pub fn title(&self) -> Option<String> {
+        let root = DeTable::parse(&self.text).ok()?;
+        let title = root.get_ref().get("title")?.get_ref().as_str()?.trim();
+        (!title.is_empty()).then(|| title.to_owned())
+    }
+
+    /// Returns the names and patterns of `[report] values`.
+    pub fn report_values(&self) -> Vec<String> {
+        let values = || {
+            let root = DeTable::parse(&self.text).ok()?;
+            let table = root.get_ref().get(REPORT)?.get_ref().as_table()?.clone();
+            let names = table.get("values")?.get_ref().as_array()?.clone();
+            Some(names.iter().filter_map(|name| Some(name.get_ref().as_str()?.to_owned())).collect())
+        };
+        values().unwrap_or_default()
     }
 }
 

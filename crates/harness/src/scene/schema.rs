@@ -85,6 +85,14 @@ fn add_version(scene: &mut Value) {
         "additionalProperties": { "type": "string" },
         "description": "Scenes whose results this one reads: NAME = \"PATH of the scene, relative to this one\".",
     });
+    scene["properties"][REPORT] = json!({
+        "type": "object",
+        "additionalProperties": false,
+        "required": ["values"],
+        "properties": { "values": { "type": "array", "items": { "type": "string" } } },
+        "description": "Values to show first in the terminal and on the page: names, or patterns with `*`; a name without \
+                        its variant stands for those of all variants.",
+    });
     match scene["required"].as_array_mut() {
         Some(required) => required.insert(0, json!("version")),
         None => scene["required"] = json!(["version"]),

@@ -61,7 +61,7 @@ pub fn search<C: Case>(
             return Err(Error::Option { option: format!("--search {key}"), reason }.into());
         }
         let first = rows.rows.iter().take(values.len()).map(met).collect();
-        Ok((first, Finished { text: rows.text(), report }))
+        Ok((first, Finished::new(report, rows.text())))
     };
     let (met, mut finished) = try_out(&[*low, *high])?;
     let verdict = match met[..] {
