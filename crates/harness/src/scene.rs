@@ -156,27 +156,19 @@ impl Source {
         SceneError::value(self, &key, span, &found.to_string(), &allowed.to_string())
     }
 
-    /// Returns the error "missing `key`: why", at the nearest existing parent of the key.
-    ///
-    /// `why` says what needs it and what to write:
-    /// `source.missing("body.thickness", "a plane body needs it; write a length")`.
+    /// Reports a key that must be written: "missing `key`: needed for …".
     pub fn missing(&self, key: &str, why: impl ToString) -> SceneError {
         let (key, span) = self.place(key);
         SceneError::missing(self, key, span, &why.to_string())
     }
 
-    /// Returns the error "unexpected `key`: why", at the key.
-    ///
-    /// `why` says what the key belongs to and what to do:
-    /// `source.unexpected("mesh.unit", "only mesh files have a unit; remove it")`.
+    /// Reports a key that has no meaning here: "unexpected `key`: …".
     pub fn unexpected(&self, key: &str, why: impl ToString) -> SceneError {
         let (key, span) = self.place(key);
         SceneError::unexpected(self, key, span, &why.to_string())
     }
 
-    /// Returns the error "`key` conflicts with `other`: why", at `key`.
-    ///
-    /// `why` says what to do: `source.conflict("contact.short_range", "contact.stiffness", "keep one of them")`.
+    /// Reports a key that excludes another one: "`key` conflicts with `other`: …".
     pub fn conflict(&self, key: &str, other: &str, why: impl ToString) -> SceneError {
         let (key, span) = self.place(key);
         SceneError::conflict(self, key, span, other, &why.to_string())

@@ -171,21 +171,24 @@ impl SceneError {
     }
 
     pub(super) fn missing(source: &Source, key: String, span: Range<usize>, why: &str) -> Self {
-        let name = key.rsplit('.').next().unwrap_or(&key);
-        let label = format!("`{name}` is needed here");
         let message = format!("missing `{key}`: {why}");
-        Self::at(source, "scene::missing_key", Some(key), span, message).label(label)
+        Self::at(source, "scene::missing_key", Some(key), span, message).label("needed here")
     }
 
     pub(super) fn unexpected(source: &Source, key: String, span: Range<usize>, why: &str) -> Self {
         let message = format!("unexpected `{key}`: {why}");
-        Self::at(source, "scene::unexpected_key", Some(key), span, message).label("not allowed here")
+        Self::at(source, "scene::unexpected_key", Some(key), span, message).label("remove this")
     }
 
-    pub(super) fn conflict(source: &Source, key: String, span: Range<usize>, other: &str, why: &str) -> Self {
-        let label = format!("conflicts with `{other}`");
+    pub(super) fn conflict(
+        source: &Source,
+        key: String,
+        span: Range<usize>,
+        other: &str,
+        why: &str,
+    ) -> Self {
         let message = format!("`{key}` conflicts with `{other}`: {why}");
-        Self::at(source, "scene::conflict", Some(key), span, message).label(label)
+        Self::at(source, "scene::conflict", Some(key), span, message).label("here")
     }
 
     /// Translates serde's words for the reader of a TOML file.
