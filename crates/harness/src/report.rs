@@ -17,10 +17,12 @@ mod expect;
 mod number;
 mod provenance;
 mod quantity;
+mod units;
 
 pub use expect::{Bound, Expect, Judgement, Kind, Tolerance};
 pub use provenance::{Git, Host, Provenance};
 pub use quantity::{Named, Quantity};
+pub use units::SceneUnits;
 
 /// The name of the file that [`Report::write`] leaves in the output directory.
 pub const FILE_NAME: &str = "report.json";

@@ -14,9 +14,10 @@ pub mod terminal;
 pub use cli::{RunArguments, main, solve};
 pub use folder::{RunLock, lock_run, prepare_run, remove_unfinished, resume_run, share_run};
 pub use inputs::{Input, InputState, attached, input_state, inputs};
-use rows::fits;
+pub(crate) use rows::fits;
+pub(crate) use rows::natural;
 pub use rows::{Row, Rows, STATISTICS};
-pub(crate) use summary::main_names;
+pub(crate) use summary::{Names, main_names};
 pub use sweep::{
     OF_SAMPLES, OF_SWEEPS, Part, Sample, Search, Shard, SweepOptions, Vary, drawn, job, search, sweep,
 };

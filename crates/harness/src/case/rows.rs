@@ -197,7 +197,7 @@ fn verdict(report: &Report) -> String {
 }
 
 /// Whether a name fits a pattern in which `*` stands for any text.
-pub(super) fn fits(pattern: &str, name: &str) -> bool {
+pub(crate) fn fits(pattern: &str, name: &str) -> bool {
     match pattern.split_once('*') {
         None => pattern == name,
         Some((before, after)) => name.strip_prefix(before).is_some_and(|rest| {
@@ -207,7 +207,7 @@ pub(super) fn fits(pattern: &str, name: &str) -> bool {
 }
 
 /// A name's pieces of text and numbers, so that `layer-10` comes after `layer-9`.
-pub(super) fn natural(name: &str) -> Vec<(String, u64)> {
+pub(crate) fn natural(name: &str) -> Vec<(String, u64)> {
     let mut pieces = Vec::new();
     let mut rest = name;
     while !rest.is_empty() {

@@ -81,14 +81,14 @@ fn bracketed(name: &str) -> Option<(&str, &str)> {
 }
 
 /// The scalars of a report by variant and quantity.
-struct Names<'a> {
+pub(crate) struct Names<'a> {
     report: &'a Report,
     /// Quantities that several folders have, `FOLDER.QUANTITY`.
     shared: BTreeSet<&'a str>,
 }
 
 impl<'a> Names<'a> {
-    fn new(report: &'a Report) -> Self {
+    pub(crate) fn new(report: &'a Report) -> Self {
         let mut owners: BTreeMap<&str, usize> = BTreeMap::new();
         for (_, quantity) in report.values.keys().filter_map(|name| name.split_once('.')) {
             *owners.entry(quantity).or_default() += 1;
@@ -97,7 +97,7 @@ impl<'a> Names<'a> {
     }
 
     /// Quantity and variant of a name; the variant is empty where there is none.
-    fn split<'n>(&self, name: &'n str) -> (&'n str, &'n str) {
+    pub(crate) fn split<'n>(&self, name: &'n str) -> (&'n str, &'n str) {
         if let Some(parts) = bracketed(name) {
             return parts;
         }

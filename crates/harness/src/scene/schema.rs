@@ -4,7 +4,7 @@ use schemars::generate::SchemaSettings;
 use schemars::{Schema, SchemaGenerator};
 use serde_json::{Value, json};
 
-use super::{INPUTS, VERSION};
+use super::{INPUTS, REPORT, VERSION};
 use crate::report::Quantity;
 
 /// The schema (draft 7, which editors of TOML read) of the scenes of a program: one of the types that `alternatives`
