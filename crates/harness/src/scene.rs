@@ -14,9 +14,10 @@
 //! assert!(error.message().contains("did you mean `spacing`?"));
 //! ```
 //!
-//! Every scene begins with `version = 1`; [`Source::parse`] checks and removes that key, and `[inputs]`, so scene types do not
-//! declare them. Alternatives are best written as a struct of options that is checked afterwards: serde buffers untagged
-//! enums, after which it knows neither the place nor what would have been allowed. Cross-field checks are the program's: it reports them with [`Source::error`].
+//! Every scene begins with `version = 1`; [`Source::parse`] checks and removes that key, and `[inputs]`, so
+//! scene types do not declare them. Alternatives are best written as a struct of options that is checked
+//! afterwards: serde buffers untagged enums, after which it knows neither the place nor what would have been
+//! allowed. Cross-field checks are the program's: it reports them with [`Source::error`].
 
 use std::fs::File;
 use std::io::Read;
@@ -68,9 +69,9 @@ pub const LARGEST_FILE: u64 = 16 << 20;
 pub struct Source {
     /// The file, as given by the user.
     pub path: PathBuf,
-    /// Its content.
+    /// Content of the file.
     pub text: String,
-    /// What stands in for other parts, see [`Source::with_replaced`].
+    /// Replacements of parts of the scene, see [`Source::with_replaced`].
     overlays: Vec<overlay::Overlay>,
     /// Files that have been read for it.
     files: files::Notes,
@@ -148,10 +149,10 @@ impl Source {
         })
     }
 
-    /// An error about the value at a dotted key path, for rules that span several keys.
+    /// Reports the value at a dotted key path, for rules that span several keys.
     ///
-    /// `source.error("body.parts[1].radius", "0.6 m, larger than the plate", "less than 0.5 m")`. A path that does
-    /// not exist points at its nearest existing parent.
+    /// `source.error("body.parts[1].radius", "0.6 m, larger than the plate", "less than 0.5 m")`. A path that
+    /// does not exist points at its nearest existing parent.
     pub fn error(&self, key: &str, found: impl ToString, allowed: impl ToString) -> SceneError {
         let (key, span) = self.place(key);
         SceneError::value(self, &key, span, &found.to_string(), &allowed.to_string())
@@ -175,20 +176,20 @@ impl Source {
         SceneError::conflict(self, key, span, other, &why.to_string())
     }
 
-    /// As [`Source::error`], of what already tells what was found and what is allowed: a file that cannot be used.
+    /// Reports an error at a key in its own words, such as a file that cannot be used.
     pub fn refused(&self, key: &str, error: impl ToString) -> SceneError {
         let (key, span) = self.place(key);
         SceneError::refused(self, key, span, &error.to_string())
     }
 
-    /// As [`Source::error`], of a name that is none of the known ones; a similar one is proposed, and of many the
+    /// Reports a name that is not known; a similar one is proposed, and of many the
     /// most similar ones are shown.
     pub fn unknown(&self, key: &str, name: &str, known: &[&str]) -> SceneError {
         let (key, span) = self.place(key);
         SceneError::unknown(self, key, span, name, known)
     }
 
-    /// Where the value at a dotted key path is written: its path in the text and its span.
+    /// Returns the path in the text and the span of the value at a dotted key path.
     fn place(&self, key: &str) -> (String, std::ops::Range<usize>) {
         let root = DeTable::parse(&self.text).ok();
         let origin = root.as_ref().and_then(|root| self.origin(root.get_ref(), key));

@@ -1,4 +1,5 @@
-//! The command line that all programs have: run, resume, check, sweep, schema, completions, and a program's own commands.
+//! The command line that all programs have: run, resume, check, sweep, schema, completions, and a program's
+//! own commands.
 
 use super::inputs::{InputArguments, attach, describe};
 use super::summary::summary;
@@ -41,7 +42,7 @@ enum Command<V: Subcommand> {
     Check {
         /// The scene (TOML).
         scene: PathBuf,
-        /// As `run --quick` would.
+        /// Check as `run --quick` would.
         #[arg(long)]
         quick: bool,
         #[command(flatten)]
@@ -100,12 +101,13 @@ pub struct RunArguments {
 struct SweepArguments {
     /// The scene (TOML).
     scene: PathBuf,
-    /// A key of the scene and its values, e.g. print.layer_time=10s,20s,40s; several make a grid, and keys joined with
-    /// `;` change together.
+    /// A key of the scene and its values, e.g. print.layer_time=10s,20s,40s; several make a grid, and keys
+    /// joined with `;` change together.
     #[arg(long, value_name = "KEY=VALUE,…", required_unless_present_any = ["search", "sample"])]
     vary: Vec<Vary>,
     /// A table of the scene and a CSV file with draws of its keys, such as a fit writes, e.g.
-    /// materials.pa12.kinetics=out/fit/nakamura_posterior.csv: gives the band of every value; may be repeated.
+    /// materials.pa12.kinetics=out/fit/nakamura_posterior.csv: gives the band of every value; may be
+    /// repeated.
     #[arg(long, value_name = "KEY=FILE", conflicts_with = "search")]
     sample: Vec<Sample>,
     /// Draws of the samples to run; default: 20, or all of a shorter file.
@@ -151,8 +153,8 @@ impl Checkpoints {
     }
 }
 
-/// The main function of a program: its commands on scenes, and `own`, which runs its own commands `V`. Each gives whether
-/// it passed.
+/// The main function of a program: its commands on scenes, and `own`, which runs its own commands `V`. Each
+/// gives whether it passed.
 pub fn main<C: Case, V: Subcommand>(own: impl FnOnce(V) -> Result<bool, Failure<C::Error>>) -> ExitCode {
     let program = C::PROGRAM;
     let mut command = with_negative_numbers(Cli::<V>::command())

@@ -107,7 +107,8 @@ impl<'a> Names<'a> {
         }
     }
 
-    /// Scalars that fit patterns, in the order of these; a pattern also stands for its values of all variants.
+    /// Scalars that fit patterns, in the order of these; a pattern also stands for its values of all
+    /// variants.
     fn fitting<'p>(&self, patterns: impl Iterator<Item = &'p str>) -> Vec<&'a str> {
         let mut found: Vec<&str> = Vec::new();
         for pattern in patterns {
@@ -128,8 +129,8 @@ impl<'a> Names<'a> {
     }
 }
 
-/// Names of the values that matter: those that `[report]` lists, otherwise those of the first expectations, otherwise the
-/// main values of the program, otherwise the first.
+/// Names of the values that matter: those that `[report]` lists, otherwise those of the first expectations,
+/// otherwise the main values of the program, otherwise the first.
 pub(crate) fn main_names(report: &Report, listed: &[String], columns: &[&str]) -> Vec<String> {
     let names = Names::new(report);
     let mut found = names.fitting(listed.iter().map(String::as_str));
@@ -223,7 +224,7 @@ fn by_variant(names: &Names, shown: &[&str], width: usize) -> String {
     text + &if left > 0 { format!("… {left} more variants in {FILE_NAME}\n") } else { String::new() }
 }
 
-/// How many expectations are met, by kind of evidence, and all that are not.
+/// Returns the number of expectations that are met, by kind of evidence, and all that are not.
 fn verdict(report: &Report, style: &Style) -> String {
     let met = report.expect.iter().filter(|one| one.pass).count();
     let all = report.expect.len();
@@ -249,7 +250,7 @@ fn verdict(report: &Report, style: &Style) -> String {
     text + &style.red(&lines)
 }
 
-/// Where the results are, and what to do next.
+/// Returns the paths of the results, and the next command.
 fn files(output: &Path, style: &Style) -> String {
     let entries = std::fs::read_dir(output).into_iter().flatten().flatten();
     let mut names: Vec<String> = entries.filter_map(|entry| entry.file_name().into_string().ok()).collect();

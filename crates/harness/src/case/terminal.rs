@@ -1,4 +1,4 @@
-//! What the command lines of this workspace share: exit codes, progress, threads, where results go.
+//! Shared parts of all command lines: exit codes, progress, threads, folder of the results.
 
 use super::Fault;
 use crate::scene::Failure;
@@ -13,11 +13,12 @@ use std::time::{Duration, Instant};
 /// Time between lines of progress where there is no terminal.
 const LOG_EVERY: Duration = Duration::from_secs(10);
 
-/// Whether standard output took less than was printed.
+/// True if standard output took less than was printed.
 static CUT_SHORT: AtomicBool = AtomicBool::new(false);
 
-/// Prints a line to standard output as `println!` does, but without its panic: a reader that has seen enough (`| head`)
-/// is no reason to fail; what else goes wrong, a full disk for example, is said once and makes [`exit`] fail.
+/// Prints a line to standard output as `println!` does, but without its panic: a reader that has seen enough
+/// (`| head`) is no reason to fail; what else goes wrong, a full disk for example, is said once and makes
+/// [`exit`] fail.
 ///
 /// [`exit`]: crate::case::terminal::exit
 #[macro_export]
@@ -148,7 +149,8 @@ pub fn default_output(scene: &Path) -> PathBuf {
     Path::new("out").join(name)
 }
 
-/// Whether the run of an output directory is finished, which is said: its report is there, and its checkpoint is gone.
+/// Returns whether the run of an output folder is finished (it has a report and no checkpoint), and prints
+/// so.
 pub fn is_finished(output: &Path) -> bool {
     let there = |name: &str| output.join(name).is_file();
     let finished = !there(crate::checkpoint::FILE_NAME) && there(crate::report::FILE_NAME);
@@ -199,7 +201,7 @@ impl Threads {
     }
 }
 
-/// Whether the user asked to stop (Ctrl-C, SIGTERM) since the first call.
+/// Returns a function that is true once the user has asked to stop (Ctrl-C, SIGTERM) since the first call.
 pub fn interrupted() -> &'static (dyn Fn() -> bool + Sync) {
     static STOP: AtomicBool = AtomicBool::new(false);
     // a second handler cannot be set; the first does the same
@@ -214,7 +216,7 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Nothing is shown yet.
+    /// Returns a bar that shows nothing yet.
     pub fn start() -> Self {
         let bar = match std::io::stderr().is_terminal() {
             true => ProgressBar::new(1000),
@@ -226,7 +228,7 @@ impl Progress {
         Self { bar, logged: Instant::now() }
     }
 
-    /// The part done, 0 to 1, and what to say of it.
+    /// Shows the fraction done, 0 to 1, and a message.
     pub fn show(&mut self, part: f64, message: impl FnOnce() -> String) {
         if !self.bar.is_hidden() {
             self.bar.set_position((1000.0 * part) as u64);
@@ -237,7 +239,7 @@ impl Progress {
         }
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub fn finish(self) {
         self.bar.finish_and_clear();
     }

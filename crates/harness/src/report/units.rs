@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 /// Unit in which a number of a report is shown.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShownUnit {
-    /// As it is written beside the number.
+    /// Symbol beside the number.
     pub name: &'static str,
     /// Factor from the unit of the report.
     pub factor: f64,
@@ -31,7 +31,7 @@ const READABLE: std::ops::Range<f64> = 1e-3..1e5;
 /// Units that a scene uses.
 #[derive(Debug, Default)]
 pub struct SceneUnits {
-    /// How often, by name.
+    /// Number of uses, by name.
     counts: BTreeMap<&'static str, usize>,
 }
 
@@ -69,8 +69,8 @@ impl SceneUnits {
         }
     }
 
-    /// Returns the unit for numbers up to `largest`, in `unit` of the report: that of the scene if it gives readable
-    /// numbers, otherwise the largest unit that does. Other units stay.
+    /// Returns the unit for numbers up to `largest`, in `unit` of the report: that of the scene if it gives
+    /// readable numbers, otherwise the largest unit that does. Other units stay.
     pub fn shown(&self, unit: &str, largest: f64) -> Option<ShownUnit> {
         let (_, choices) = DIMENSIONS.iter().find(|dimension| dimension.0.contains(&unit))?;
         let count = |name: &str| self.counts.get(name).copied().unwrap_or_default();

@@ -10,7 +10,7 @@ use toml::de::DeTable;
 
 use super::{EXIT_BAD_INPUT, Source, VERSION, locate};
 
-/// What is wrong with a scene: a [`miette::Diagnostic`] with file, line, caret and help.
+/// Error in a scene: a [`miette::Diagnostic`] with file, line, caret and help.
 #[derive(Debug)]
 pub struct SceneError(Box<Inside>);
 
@@ -64,8 +64,8 @@ impl SceneError {
         EXIT_BAD_INPUT
     }
 
-    /// The message with the lines of the source it is about, as the command lines print it: one message line, never
-    /// wrapped, so that it can be searched for; in colours if standard error is a terminal.
+    /// The message with the lines of the source it is about, as the command lines print it: one message line,
+    /// never wrapped, so that it can be searched for; in colours if standard error is a terminal.
     pub fn render(&self) -> String {
         self.drawn(std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none())
     }
@@ -281,7 +281,7 @@ impl SceneError {
     }
 }
 
-/// What a word of other programs is here.
+/// Returns the name used here for a word of other programs.
 fn advice(name: &str) -> Option<&'static str> {
     let plain: String = name.to_lowercase().chars().filter(char::is_ascii_alphanumeric).collect();
     Some(match plain.as_str() {

@@ -7,8 +7,9 @@ use serde_json::{Value, json};
 use super::{INPUTS, REPORT, VERSION};
 use crate::report::Quantity;
 
-/// The schema (draft 7, which editors of TOML read) of the scenes of a program: one of the types that `alternatives`
-/// asks the generator for, with the `version` that every scene begins with. An expectation's `quantity` is one of `quantities`.
+/// The schema (draft 7, which editors of TOML read) of the scenes of a program: one of the types that
+/// `alternatives` asks the generator for, with the `version` that every scene begins with. An expectation's
+/// `quantity` is one of `quantities`.
 ///
 /// ```
 /// #[derive(schemars::JsonSchema)]

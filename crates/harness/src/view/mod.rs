@@ -1,8 +1,8 @@
 //! A page that shows a run: one HTML file with everything in it, which opens without a network.
 //!
-//! [`view`] reads what a run has written (`report.json`, tables, fields) and gives the page: solids that turn and can be
-//! cut, coloured by any field, step by step, beside the curves of the history. Numbers are quantised and deflated, and steps
-//! and cells are dropped until all of it fits. Pages list what is dropped.
+//! [`view`] reads what a run has written (`report.json`, tables, fields) and gives the page: solids that turn
+//! and can be cut, coloured by any field, step by step, beside the curves of the history. Numbers are
+//! quantised and deflated, and steps and cells are dropped until all of it fits. Pages list what is dropped.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -47,7 +47,7 @@ const BODIES: usize = 8;
 /// Scalars of a page at most.
 const SCALARS: usize = 2_000;
 
-/// What a run left in a folder, and the folders of its studies.
+/// Results of a run in its folder and the folders of its studies.
 #[derive(Default)]
 struct Found {
     report: Option<Report>,
@@ -60,8 +60,8 @@ struct Found {
 /// The page of a run in a folder, as HTML.
 ///
 /// # Errors
-/// [`Error::OutputDirectory`] for a folder without any result; [`Error::Io`], [`Error::Format`] for files that cannot be
-/// read or are damaged, with their names.
+/// [`Error::OutputDirectory`] for a folder without any result; [`Error::Io`], [`Error::Format`] for files
+/// that cannot be read or are damaged, with their names.
 pub fn view(folder: impl AsRef<Path>) -> Result<String, Error> {
     let folder = folder.as_ref();
     let mut found = Found::default();
@@ -126,7 +126,8 @@ impl Found {
         Ok(())
     }
 
-    /// How far apart, in spacings, neighbours of a variant may be that are still bonded: the rule of the pictures.
+    /// Returns the largest distance, in spacings, of neighbours of a variant that are still bonded, as in the
+    /// pictures.
     fn bridge(&self, variant: &str) -> f64 {
         let of_it = |name: &str, quantity: &str| {
             let written = |name: &str| name.replace(' ', "_").replace('=', "-");
@@ -168,7 +169,8 @@ impl Found {
 }
 
 impl Detail {
-    /// Less of a file of `steps` steps that took `over` times the room it has: steps first, then cells, then steps.
+    /// Less of a file of `steps` steps that took `over` times the room it has: steps first, then cells, then
+    /// steps.
     fn less(self, steps: usize, over: f64) -> Self {
         let now = self.steps.min(steps);
         let part = ((now as f64 / over * 0.95) as usize).min(now.saturating_sub(1));

@@ -16,7 +16,7 @@ const NUMBERS: usize = 80_000;
 /// Columns of numbers.
 #[derive(Debug, Serialize)]
 pub struct Table {
-    /// Its file without `.csv`, or the name of a curve.
+    /// File without `.csv`, or name of a curve.
     name: String,
     /// Row k is row k · `every` of the file.
     every: usize,
@@ -38,7 +38,7 @@ struct Column {
 /// All tables of a page, and what had no room.
 #[derive(Debug, Default)]
 pub struct Tables {
-    /// In the order in which they came.
+    /// Tables in the order in which they came.
     pub tables: Vec<Table>,
     /// Names of those left out.
     pub left_out: Vec<String>,
