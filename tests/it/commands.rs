@@ -298,7 +298,7 @@ source = "a coarse lattice is below Kirsch's peak"
 "#;
     let scene = scenes::plate("\"20 mm\"", "1e-6") + expect;
     fs::write(here.join("plate.toml"), &scene).unwrap();
-    let ended = peri("run plate.toml --output out --explain --threads 2", here).with_code(0);
+    let ended = peri("run plate.toml --output out --explain --threads 2 --verbose", here).with_code(0);
     ended.shows("  builds ");
     ended.shows("results in out");
     assert_eq!(ended.stdout.matches("pass  ").count(), 2, "{}", ended.stdout);

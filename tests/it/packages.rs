@@ -52,7 +52,6 @@ fn libraries_bring_no_shell() {
             "clap",
             "indicatif",
             "rust-hdf5",
-            "plotly",
             "burn",
         ] {
             let reads_tables = package != "polycore" && package != "peri" && name == "csv";

@@ -229,7 +229,7 @@ fn studies_of_a_part() {
     told.shows("study coupled");
     told.shows("leaves out latent heat: temperature does not depend on crystallinity");
     told.shows("  expects    an error that contains `no extent`");
-    crystfem("run bar.toml --output out").with_code(0).shows("pass  coupled.least_alpha");
+    crystfem("run bar.toml --output out --verbose").with_code(0).shows("pass  coupled.least_alpha");
     let out = here.join("out");
     let report = report(&out);
     let of = |name: &str| scalar(&report, name);

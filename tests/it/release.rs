@@ -114,5 +114,5 @@ fn an_archive_for_this_system() {
         assert!(places.iter().any(|found| found.starts_with(place)), "Dockerfile: no {place}");
     }
     assert!(page.starts_with(".ie") && page.contains("\\-\\-checkpoint\\-every"), "{page}");
-    assert!(terms.contains("\n| nalgebra ") && terms.contains("plotly.js (MIT"), "{terms}");
+    assert!(terms.contains("\n| nalgebra "), "{terms}");
 }

@@ -87,7 +87,13 @@ fn few_lines() {
     let here = directory.path();
     let bar = BAR.replace("tolerance = \"1 K\"", "tolerance = \"3 K\"").replace("layers = 3", "layers = 12");
     fs::write(here.join("bar.toml"), bar.replace("layer_time = \"10 s\"", "layer_time = \"5 s\"")).unwrap();
-    let ended = crystfem("run bar.toml --output out", here).with_code(0);
+    let short = crystfem("run bar.toml --output out", here).with_code(0);
+    assert!(short.stdout.lines().count() <= 25, "{}", short.stdout);
+    assert!(short.stdout.lines().all(|line| line.chars().count() <= 100), "{}", short.stdout);
+    assert!(!short.stdout.contains('\u{1b}'), "a file has no colours");
+    short.shows("results in out: report.json");
+    short.shows("view out");
+    let ended = crystfem("run bar.toml --output out --verbose", here).with_code(0);
     assert!(ended.stdout.lines().count() < 40, "{}", ended.stdout);
     ended.shows(" more values in report.json");
 }

@@ -123,10 +123,7 @@ fn read_package(package: &Package, what: String, mit: &str, apache: &str) -> Res
 fn format_list(parts: &mut [LinkedPackage]) -> String {
     parts.sort_by(|a, b| a.what.cmp(&b.what));
     let mut text = String::from(
-        "# Third-party software\n\nThe programs contain these crates. `plotly` contains plotly.js (MIT, \
-         Copyright 2012-2025, \
-         Plotly, Inc.), which the pages of the command `view` contain too.\n\n| crate | licence |\n\
-         |---|---|\n",
+        "# Third-party software\n\nThe programs contain these crates.\n\n| crate | licence |\n|---|---|\n",
     );
     let mut texts: BTreeMap<String, (Vec<&str>, &str)> = BTreeMap::new();
     for part in parts.iter() {
@@ -155,7 +152,7 @@ mod tests {
         let workspace = Repository::new(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(".."));
         let text = text(&workspace, &workspace.programs()).expect("terms of all crates");
         let (list, _) = text.split_once("\n## ").expect("texts");
-        for name in ["nalgebra", "burn", "plotly", "rust-hdf5", "faer"] {
+        for name in ["nalgebra", "burn", "kuva", "rust-hdf5", "faer"] {
             assert!(list.contains(&format!("\n| {name} ")), "{name}");
         }
         for name in ["proptest", "criterion", "evidence", "windows-sys"] {

@@ -1,5 +1,5 @@
-//! Studies of a scene: a `[[study]]` replaces parts of the scene, sets single keys, and lists values of keys; every
-//! combination of the values is a variant, a scene of its own.
+//! Studies of a scene: a `[[study]]` replaces parts of the scene, sets single keys, and lists values of keys;
+//! every combination of the values is a variant, a scene of its own.
 
 mod compare;
 mod convergence;
@@ -64,8 +64,9 @@ impl<T: JsonSchema> JsonSchema for Instead<T> {
     }
 }
 
-/// Declares the `[[study]]` of a program: `replaces` are blocks of the scene with their types, `lists` keys whose values may
-/// be listed; both name the key of the scene. A key before the one that holds it: the first holds.
+/// Declares the `[[study]]` of a program: `replaces` are blocks of the scene with their types, `lists` keys
+/// whose values may be listed; both name the key of the scene. A key before the one that holds it: the first
+/// holds.
 #[macro_export]
 macro_rules! study {
     ($(#[$about:meta])* pub struct $name:ident;
@@ -75,7 +76,7 @@ macro_rules! study {
         #[derive(Clone, Debug, Default, serde::Deserialize, schemars::JsonSchema)]
         #[serde(deny_unknown_fields, default)]
         pub struct $name {
-            /// Its name, a part of the names of values and files.
+            /// Name, a part of the names of values and files.
             pub name: Option<String>,
             /// Expected behaviour, for the table of a suite.
             pub description: Option<String>,
@@ -117,7 +118,7 @@ macro_rules! study {
 /// A `[[study]]`, whatever the program.
 #[derive(Clone, Debug, Default)]
 pub struct Study {
-    /// Its name.
+    /// Name.
     pub name: Option<String>,
     /// Expected behaviour.
     pub description: Option<String>,
@@ -125,7 +126,7 @@ pub struct Study {
     pub expect_error: Option<String>,
     /// Part of `--quick` runs.
     pub quick: bool,
-    /// Whether it has a `set`.
+    /// True if it has a `set`.
     pub sets: bool,
     /// Keys of the scene and the keys of the study that replace them.
     pub replaced: Vec<[&'static str; 2]>,
@@ -153,7 +154,7 @@ impl Naming {
         }
     }
 
-    /// Whether a quantity is a value of a variant.
+    /// Returns whether a quantity is a value of a variant.
     pub fn is_of(self, variant: &str, quantity: &str) -> bool {
         match self {
             Self::Brackets => quantity.ends_with(&format!("[{variant}]")),
@@ -178,7 +179,7 @@ impl Naming {
 /// A variant of a scene.
 #[derive(Clone, Debug)]
 pub struct Variant {
-    /// Its name.
+    /// Name.
     pub name: String,
     /// The index of its study; none of a scene without studies.
     pub study: Option<usize>,
@@ -190,12 +191,13 @@ pub struct Variant {
     pub expect_error: Option<String>,
 }
 
-/// Lists the variants of a scene: the scene itself where it has no studies; `quick` leaves out those of studies with
-/// `quick = false`. `name` names a variant by its scene and its study's name; of equal variants the first is taken.
+/// Lists the variants of a scene: the scene itself where it has no studies; `quick` leaves out those of
+/// studies with `quick = false`. `name` names a variant by its scene and its study's name; of equal variants
+/// the first is taken.
 ///
 /// # Errors
-/// Names of studies that cannot be names of files, equal names of different variants, a quick run of nothing, and what `name`
-/// finds.
+/// Names of studies that cannot be names of files, equal names of different variants, a quick run of nothing,
+/// and what `name` finds.
 pub fn variants(
     source: &Source,
     studies: &[Study],
@@ -222,7 +224,8 @@ pub fn variants(
             .map(|(key, values)| (key.as_str(), format!("vary.{key}"), values.len(), Some(values)));
         let lists: Vec<_> = lists.chain(vary).collect();
         for places in grid(&lists.iter().map(|list| list.2).collect::<Vec<_>>()) {
-            // of what concerns a key the first holds: listed values before single keys, and these before blocks
+            // of what concerns a key the first holds: listed values before single keys, and these before
+            // blocks
             let (mut own, mut label) = (source.clone(), study.name.clone());
             for ((key, list, _, values), place) in lists.iter().zip(places) {
                 own = own.with_replaced(key, &format!("study[{index}].{list}[{place}]"));
@@ -287,7 +290,7 @@ pub fn grid(lengths: &[usize]) -> impl Iterator<Item = Vec<usize>> {
 
 /// A solved variant, as comparisons see it.
 pub trait Solved {
-    /// Its name.
+    /// Name.
     fn name(&self) -> &str;
 
     /// A scalar and its unit.

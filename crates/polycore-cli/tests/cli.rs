@@ -40,7 +40,7 @@ fn folder(scene: &str) -> (tempfile::TempDir, PathBuf) {
 }
 
 fn run(scene: &Path, output: &Path) -> Output {
-    polycore(&["run", scene.to_str().unwrap(), "--output", output.to_str().unwrap(), "--quick"])
+    polycore(&["run", scene.to_str().unwrap(), "--output", output.to_str().unwrap(), "--quick", "--verbose"])
 }
 
 fn text(bytes: &[u8]) -> String {
@@ -124,7 +124,12 @@ fn what_a_newcomer_sees() {
     let mut texts = Vec::new();
     for name in [scene.file_name(), other.file_name()] {
         let mut command = Command::new(env!("CARGO_BIN_EXE_polycore"));
-        let result = command.current_dir(folder.path()).arg("run").arg(name.unwrap()).arg("--quick").output();
+        let result = command
+            .current_dir(folder.path())
+            .arg("run")
+            .arg(name.unwrap())
+            .args(["--quick", "--verbose"])
+            .output();
         texts.push(text(&result.unwrap().stdout));
     }
     assert!(folder.path().join("out/chains/report.json").exists());

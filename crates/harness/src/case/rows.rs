@@ -5,7 +5,8 @@ use crate::study::Solved;
 use polycore::file::atomic_write;
 use std::path::Path;
 
-/// Statistics of a field: its mean by volume, its extremes, and its standard deviation, which measures uniformity.
+/// Statistics of a field: its mean by volume, its extremes, and its standard deviation, which measures
+/// uniformity.
 pub const STATISTICS: [&str; 4] = ["mean_", "least_", "largest_", "deviation_of_"];
 
 /// Heading of the column that says whether a run meets the scene's expectations.
@@ -13,11 +14,11 @@ const ENDS: &str = "passed";
 
 /// A run among others.
 pub struct Row {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// What was set, one text for each heading.
+    /// Values that were set, one for each heading.
     pub settings: Vec<String>,
-    /// Its report, or why there is none.
+    /// Report, or the error that ended the run.
     pub outcome: Result<Report, String>,
 }
 
@@ -50,12 +51,12 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// Whether every run came to its end.
+    /// Returns whether every run has ended without an error.
     pub fn passed(&self) -> bool {
         self.rows.iter().all(|row| row.outcome.is_ok())
     }
 
-    /// Whether some run has a value.
+    /// Returns whether some run has a value.
     pub fn has(&self, name: &str) -> bool {
         self.reports().any(|report| report.scalar(name).is_some())
     }
@@ -86,14 +87,15 @@ impl Rows {
         names
     }
 
-    /// Names of all values that the table shows: the statistics of each field, and what further columns ask for.
+    /// Names of all values that the table shows: the statistics of each field, and what further columns ask
+    /// for.
     pub fn names(&self) -> Vec<String> {
         let fields = self.fields();
         let statistics = fields.iter().flat_map(|field| STATISTICS.map(|name| format!("{name}{field}")));
         statistics.chain(self.asked()).collect()
     }
 
-    /// Whether some run has expectations.
+    /// Returns whether some run has expectations.
     fn judged(&self) -> bool {
         self.reports().any(|report| !report.expect.is_empty())
     }
@@ -196,8 +198,8 @@ fn verdict(report: &Report) -> String {
     if missed.is_empty() { "yes".to_owned() } else { format!("no: {}", missed.join(" ")) }
 }
 
-/// Whether a name fits a pattern in which `*` stands for any text.
-pub(super) fn fits(pattern: &str, name: &str) -> bool {
+/// Returns whether a name fits a pattern in which `*` stands for any text.
+pub(crate) fn fits(pattern: &str, name: &str) -> bool {
     match pattern.split_once('*') {
         None => pattern == name,
         Some((before, after)) => name.strip_prefix(before).is_some_and(|rest| {
@@ -207,7 +209,7 @@ pub(super) fn fits(pattern: &str, name: &str) -> bool {
 }
 
 /// A name's pieces of text and numbers, so that `layer-10` comes after `layer-9`.
-fn natural(name: &str) -> Vec<(String, u64)> {
+pub(crate) fn natural(name: &str) -> Vec<(String, u64)> {
     let mut pieces = Vec::new();
     let mut rest = name;
     while !rest.is_empty() {

@@ -1,4 +1,4 @@
-//! What a case must reproduce, and the judgement whether it did.
+//! Expectations of a case, and their judgement.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -27,17 +27,17 @@ use polycore::units::Ratio;
 pub struct Expect {
     /// The name of a scalar of the report, or a quotient of two: `peak[a] / peak[b]`.
     pub quantity: String,
-    /// Between which numbers it must lie.
+    /// Accepted range.
     pub bound: Bound,
-    /// What kind of evidence the figure is.
+    /// Kind of evidence.
     pub kind: Kind,
-    /// Where the figure and its tolerance come from.
+    /// Source of the figure and its tolerance.
     pub source: String,
     /// Judged in `--quick` runs too.
     pub quick: bool,
 }
 
-/// What kind of evidence an expectation is.
+/// Kind of evidence of an expectation.
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, schemars::JsonSchema,
 )]
@@ -68,7 +68,19 @@ impl Kind {
         Self::Regression,
     ];
 
-    /// Whether a verdict may rest on it: everything but our own earlier figures.
+    /// Returns its name in running text, in the plural.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::ClosedForm => "closed forms",
+            Self::Published => "published figures",
+            Self::IndependentProgram => "figures of independent programs",
+            Self::Convergence => "convergence",
+            Self::Bound => "bounds",
+            Self::Regression => "earlier figures",
+        }
+    }
+
+    /// Returns whether a verdict may rest on it: all but our own earlier figures.
     pub fn is_evidence(self) -> bool {
         self != Self::Regression
     }
@@ -106,12 +118,12 @@ pub enum Bound {
     },
 }
 
-/// How far a value may lie from its reference.
+/// Accepted distance of a value from its reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Tolerance {
     /// A share of |reference|: `"1 %"`.
     Relative(f64),
-    /// In the unit of the value: `"0.01"` or `0.01`.
+    /// Distance in the unit of the value: `"0.01"` or `0.01`.
     Absolute(f64),
 }
 
@@ -216,9 +228,9 @@ struct Written {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     /// Instead of a reference: an upper bound.
     at_most: Option<f64>,
-    /// What kind of evidence the figure is.
+    /// Kind of evidence.
     kind: Kind,
-    /// Where the figure and its tolerance come from.
+    /// Source of the figure and its tolerance.
     source: String,
     #[serde(default = "yes")]
     /// Judged in `--quick` runs too.
@@ -317,18 +329,18 @@ fn scalar(values: &BTreeMap<String, Value>, name: &str) -> Result<f64, String> {
     }
 }
 
-/// An expectation with what was found.
+/// An expectation with the value of the report.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Judgement {
     /// The requirement.
     #[serde(flatten)]
     pub expect: Expect,
-    /// What was found.
+    /// Value of the report.
     #[serde(with = "number::option")]
     pub value: Option<f64>,
-    /// Whether it fits.
+    /// True if the expectation is met.
     pub pass: bool,
-    /// Why there was nothing to compare.
+    /// Reason if there is no value to compare.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub message: Option<String>,
 }

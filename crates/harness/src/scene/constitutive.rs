@@ -12,19 +12,20 @@ use polycore::constitutive::hyperelastic::{Compressible, Hyperelastic, MODELS, M
 use polycore::constitutive::surrogate::Surrogate;
 use polycore::units::Stress;
 
-/// A hyperelastic law with a volumetric energy ¼λ(J² − 1 − 2 ln J) that gives it a bulk modulus, or a law learnt from data.
+/// A hyperelastic law with a volumetric energy ¼λ(J² − 1 − 2 ln J) that gives it a bulk modulus, or a law
+/// learnt from data.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ConstitutiveSpec {
     /// Name of the law.
     pub model: Option<String>,
-    /// Its parameters by their names: stresses with a unit, other numbers without.
+    /// Parameters by name: stresses with a unit, other numbers without.
     pub parameters: Option<BTreeMap<String, Constant>>,
     /// Bulk modulus at rest.
     pub bulk_modulus: Option<Stress>,
-    /// In their place: a law learnt from data, a file of `mdsurrogate`, relative to the scene.
+    /// Instead of a model and parameters: file of a law learnt by `mdsurrogate`, relative to the scene.
     pub learnt: Option<PathBuf>,
-    /// With `learnt`: the file lies in the results of this scene of `[inputs]`.
+    /// Name in `[inputs]` of the scene whose results contain the file of `learnt`.
     pub input: Option<String>,
 }
 

@@ -10,7 +10,7 @@ use toml::de::DeTable;
 
 use super::{EXIT_BAD_INPUT, Source, VERSION, locate};
 
-/// What is wrong with a scene: a [`miette::Diagnostic`] with file, line, caret and help.
+/// Error in a scene: a [`miette::Diagnostic`] with file, line, caret and help.
 #[derive(Debug)]
 pub struct SceneError(Box<Inside>);
 
@@ -64,8 +64,8 @@ impl SceneError {
         EXIT_BAD_INPUT
     }
 
-    /// The message with the lines of the source it is about, as the command lines print it: one message line, never
-    /// wrapped, so that it can be searched for; in colours if standard error is a terminal.
+    /// The message with the lines of the source it is about, as the command lines print it: one message line,
+    /// never wrapped, so that it can be searched for; in colours if standard error is a terminal.
     pub fn render(&self) -> String {
         self.drawn(std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none())
     }
@@ -148,7 +148,7 @@ impl SceneError {
     pub(super) fn no_version(source: &Source, similar: Option<(String, Range<usize>)>) -> Self {
         let suggestion = similar.as_ref().map(|(name, _)| format!("; did you mean `version` by `{name}`?"));
         let message =
-            format!("`version` is missing; allowed: `version = {VERSION}`{}", suggestion.unwrap_or_default());
+            format!("missing `version`; allowed: `version = {VERSION}`{}", suggestion.unwrap_or_default());
         let span = similar.map_or(0..0, |(_, span)| span);
         let help = Some(format!("begin the file with `version = {VERSION}`"));
         Self::at(source, "scene::version", Some("version".into()), span, message).label("here").help(help)
@@ -225,7 +225,7 @@ impl SceneError {
         if serde.starts_with("missing field") {
             let path = parent.map_or_else(|| name.to_owned(), |path| format!("{path}.{name}"));
             let place = if path == name { 0..0 } else { span };
-            let message = format!("`{path}` is missing");
+            let message = format!("missing `{path}`");
             let label = format!("`{name}` is needed here");
             return Self::at(source, "scene::missing_key", Some(path), place, message).label(label);
         }
@@ -281,7 +281,7 @@ impl SceneError {
     }
 }
 
-/// What a word of other programs is here.
+/// Returns the name used here for a word of other programs.
 fn advice(name: &str) -> Option<&'static str> {
     let plain: String = name.to_lowercase().chars().filter(char::is_ascii_alphanumeric).collect();
     Some(match plain.as_str() {

@@ -1,4 +1,4 @@
-//! From key paths to places in the text, and back.
+//! Conversion between key paths and places in the text.
 
 use std::ops::Range;
 

@@ -4,11 +4,12 @@ use schemars::generate::SchemaSettings;
 use schemars::{Schema, SchemaGenerator};
 use serde_json::{Value, json};
 
-use super::{INPUTS, VERSION};
+use super::{INPUTS, REPORT, VERSION};
 use crate::report::Quantity;
 
-/// The schema (draft 7, which editors of TOML read) of the scenes of a program: one of the types that `alternatives`
-/// asks the generator for, with the `version` that every scene begins with. An expectation's `quantity` is one of `quantities`.
+/// The schema (draft 7, which editors of TOML read) of the scenes of a program: one of the types that
+/// `alternatives` asks the generator for, with the `version` that every scene begins with. An expectation's
+/// `quantity` is one of `quantities`.
 ///
 /// ```
 /// #[derive(schemars::JsonSchema)]
@@ -84,6 +85,14 @@ fn add_version(scene: &mut Value) {
         "type": "object",
         "additionalProperties": { "type": "string" },
         "description": "Scenes whose results this one reads: NAME = \"PATH of the scene, relative to this one\".",
+    });
+    scene["properties"][REPORT] = json!({
+        "type": "object",
+        "additionalProperties": false,
+        "required": ["values"],
+        "properties": { "values": { "type": "array", "items": { "type": "string" } } },
+        "description": "Values to show first in the terminal and on the page: names, or patterns with `*`; a name without \
+                        its variant stands for those of all variants.",
     });
     match scene["required"].as_array_mut() {
         Some(required) => required.insert(0, json!("version")),

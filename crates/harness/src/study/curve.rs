@@ -17,7 +17,7 @@ use serde::Deserialize;
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ErrorAgainstTime {
-    /// Its name: values are `NAME.error_of_STUDY`.
+    /// Name: values are `NAME.error_of_STUDY`.
     pub name: String,
     /// Quantities, without the study's name; the error is the root of the mean of their squared differences.
     pub quantities: Vec<String>,

@@ -27,7 +27,8 @@ fn names(variants: &[Variant]) -> Vec<&str> {
     variants.iter().map(|variant| variant.name.as_str()).collect()
 }
 
-/// Lists are a grid whose last list runs fastest; they hold over single keys, and these over blocks. What is equal runs once.
+/// Lists are a grid whose last list runs fastest; they hold over single keys, and these over blocks. What is
+/// equal runs once.
 #[test]
 fn lists_keys_and_blocks() {
     let studies = "[[study]]\nspacing = [4, 2]\nlaw = ['a', 'b']\n[[study]]\nspacing = [2, 1]\n

@@ -16,7 +16,7 @@ const EXISTS: &str = "exists";
 /// Fields of a body at most.
 const FIELDS: usize = 10;
 
-/// How much of a file is shown.
+/// Resolution of a body in steps and cells.
 #[derive(Clone, Copy, Debug)]
 pub struct Detail {
     /// Steps at most.
@@ -42,7 +42,7 @@ pub struct Body {
     births: Option<Slot>,
     frames: Vec<Frame>,
     fields: Vec<Field>,
-    /// What is left out.
+    /// Notes on what is left out.
     notes: Vec<String>,
 }
 
@@ -72,7 +72,7 @@ struct Frame {
 struct Field {
     name: String,
     unit: &'static str,
-    /// Of cells, else of points.
+    /// True for a field of cells, false for one of points.
     cells: bool,
     levels: Levels,
     slot: Slot,

@@ -10,10 +10,11 @@ use polycore::Error;
 pub struct Frames {
     /// NAME of NAME.vtkhdf.
     pub name: String,
-    /// Particles that move: time counts load steps. Otherwise a mesh that stands still, and time is in seconds.
+    /// Particles that move: time counts load steps. Otherwise a mesh that stands still, and time is in
+    /// seconds.
     pub moves: bool,
     first: Series,
-    /// Of an unfinished run: the file of each step.
+    /// File of each step, if the run is unfinished.
     files: Vec<PathBuf>,
 }
 
@@ -51,7 +52,7 @@ impl Frames {
         Ok(Some(Self { name, moves: first.moves(), first, files }))
     }
 
-    /// Whether the run that writes it has not ended.
+    /// Returns whether the run that writes the file has not ended.
     pub fn unfinished(&self) -> bool {
         !self.files.is_empty()
     }
@@ -90,7 +91,7 @@ impl Frames {
     }
 }
 
-/// What is in a folder.
+/// Returns the sorted names of the entries of a folder.
 ///
 /// # Errors
 /// [`Error::Io`].

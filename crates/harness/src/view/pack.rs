@@ -15,7 +15,7 @@ pub const VALUES: u16 = 4_095;
 /// Stands for no value.
 pub const NOTHING: u16 = u16::MAX;
 
-/// Where an array of `rows` × `count` numbers lies in a [`Store`].
+/// Position of an array of `rows` × `count` numbers in a [`Store`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Slot {
     /// First byte.
@@ -36,7 +36,7 @@ pub struct Levels {
 }
 
 impl Levels {
-    /// Of `count` + 1 levels over the finite numbers; none where there are none.
+    /// Returns `count` + 1 levels over the finite numbers, if there are any.
     pub fn over(numbers: impl IntoIterator<Item = f64>, count: u16) -> Option<Self> {
         let finite = numbers.into_iter().filter(|number| number.is_finite());
         let [low, high] = polycore::numerics::range(finite);
@@ -59,8 +59,9 @@ impl Levels {
 pub struct Store(Vec<u8>);
 
 impl Store {
-    /// Appends rows of equal length. Each row is kept as its difference from the one before, the first as differences of
-    /// neighbours, in zigzag order, low bytes before high bytes: what changes little deflates well.
+    /// Appends rows of equal length. Each row is kept as its difference from the one before, the first as
+    /// differences of neighbours, in zigzag order, low bytes before high bytes: what changes little deflates
+    /// well.
     pub fn push(&mut self, rows: &[Vec<u16>]) -> Slot {
         let (at, count) = (self.0.len(), rows.first().map_or(0, Vec::len));
         for (index, row) in rows.iter().enumerate() {
@@ -78,7 +79,7 @@ impl Store {
         Slot { at, rows: rows.len(), count }
     }
 
-    /// As text: gzip in base 64.
+    /// Returns the store as text: gzip in base 64.
     pub fn text(&self) -> String {
         zipped(&self.0)
     }
@@ -102,7 +103,7 @@ fn zigzag(change: u16) -> u16 {
 mod tests {
     use super::*;
 
-    /// As the page reads it.
+    /// Unpacks an array as the page does.
     fn unpacked(bytes: &[u8], slot: Slot) -> Vec<Vec<u16>> {
         let mut rows: Vec<Vec<u16>> = Vec::new();
         for index in 0..slot.rows {

@@ -1,4 +1,5 @@
-//! Particles as cells: deformed cells of a lattice that come apart at cracks, or a block for each particle of a cloud.
+//! Particles as cells: deformed cells of a lattice that come apart at cracks, or a block for each particle of
+//! a cloud.
 
 use polycore::numerics::DisjointSets;
 use rayon::prelude::*;
@@ -8,7 +9,7 @@ use crate::output::lattice::{Cells, NONE, Sides, joined, neighbours};
 
 /// Particles of a lattice that are drawn at most, and of a cloud, whose blocks share no corners.
 const MOST: [usize; 2] = [30_000, 8_000];
-/// How far from its place in the lattice, in spacings, a particle may be.
+/// Largest distance of a particle from its place in the lattice, in spacings.
 const OFF: f64 = 0.05;
 /// Part of the particles with a neighbour along each axis that makes a lattice.
 const LATTICE: f64 = 0.9;
@@ -17,7 +18,7 @@ const LAYERS: i64 = 4;
 /// Particles of a cloud whose nearest neighbours tell its spacing.
 const ASKED: usize = 100;
 
-/// Which particles of a body are drawn, and how large each is.
+/// Particles of a body that are drawn, and their sizes.
 #[derive(Debug)]
 pub struct Choice {
     /// Numbers of the particles.
@@ -30,7 +31,8 @@ pub struct Choice {
 }
 
 impl Choice {
-    /// The particles that are drawn: all, or every k-th along each axis of a large body; `coarser` drops more.
+    /// The particles that are drawn: all, or every k-th along each axis of a large body; `coarser` drops
+    /// more.
     pub fn of(reference: &[[f64; 3]], coarser: usize) -> Self {
         let extent = [0, 1, 2].map(|d| polycore::numerics::range(reference.iter().map(|x| x[d])));
         let longest = extent.iter().map(|[low, high]| high - low).fold(f64::MIN_POSITIVE, f64::max);
@@ -80,8 +82,8 @@ impl Choice {
         Self { kept, sides: [side; 3], plane, lattice: false }
     }
 
-    /// The solid, with the displacement of its points at each step of `positions`, those of the chosen particles. Neighbours
-    /// up to `bridge` spacings apart have no crack between them.
+    /// The solid, with the displacement of its points at each step of `positions`, those of the chosen
+    /// particles. Neighbours up to `bridge` spacings apart have no crack between them.
     pub fn solid(&self, reference: &[[f64; 3]], positions: &[Vec<[f64; 3]>], bridge: f64) -> Solid {
         // lengths in spacings
         let scaled = |x: &[f64; 3]| [0, 1, 2].map(|d| x[d] / self.sides[d]);
@@ -132,8 +134,8 @@ impl Choice {
         }
     }
 
-    /// Corners that joined cells share: a particle and a corner of its cell that stand for each, and the corners of all cells,
-    /// in VTK's order.
+    /// Corners that joined cells share: a particle and a corner of its cell that stand for each, and the
+    /// corners of all cells, in VTK's order.
     fn corners(&self, joined: &[Sides]) -> (Vec<(u32, u8)>, Vec<u32>) {
         let count = if self.plane { 4 } else { 8 };
         let mut sets = DisjointSets::new(joined.len() * count);
@@ -196,7 +198,8 @@ mod tests {
             .collect()
     }
 
-    /// Cells of unequal sides deform as one: every corner goes to its image, no corner twice, the volume is that of the block.
+    /// Cells of unequal sides deform as one: every corner goes to its image, no corner twice, the volume is
+    /// that of the block.
     #[test]
     fn blocks_deform_as_one() {
         let rest = lattice([6, 5, 4]);

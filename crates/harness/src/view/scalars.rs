@@ -1,4 +1,4 @@
-//! What is shown of an array: its components and invariants, each with name and unit.
+//! Components and invariants of an array that are shown, each with name and unit.
 
 use nalgebra::Matrix3;
 use polycore::tensor::von_mises;
@@ -8,11 +8,11 @@ pub type Rule = Box<dyn Fn(&[f64]) -> f64>;
 
 /// A scalar made of the components of an array at a place.
 pub struct Scalar {
-    /// As the page shows it.
+    /// Name on the page.
     pub name: String,
     /// Components of the array.
     pub components: usize,
-    /// Its value.
+    /// Value at a place.
     pub of: Rule,
     /// The least are shown first, and dropped last.
     pub rank: u8,
@@ -21,7 +21,7 @@ pub struct Scalar {
 
 /// Names of the components of a symmetric tensor of six, in VTK's order, and of one of nine, rows first.
 const SIX: [&str; 6] = ["11", "22", "33", "12", "23", "13"];
-/// Where the six components of a symmetric tensor are among nine, rows first.
+/// Positions of the six components of a symmetric tensor among nine, rows first.
 const OF_NINE: [usize; 6] = [0, 4, 8, 1, 5, 2];
 
 impl Scalar {

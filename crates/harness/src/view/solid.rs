@@ -23,8 +23,8 @@ const DRAWN: [(u8, u8, usize); 11] = [
     (25, HEXAHEDRON, 8),
     (26, 13, 6),
 ];
-/// Tetrahedra of a cell by its type. Those of a hexahedron share its diagonal from corner 0 to 6, so that cells of a
-/// structured mesh fit together.
+/// Tetrahedra of a cell by its type. Those of a hexahedron share its diagonal from corner 0 to 6, so that
+/// cells of a structured mesh fit together.
 const PARTS: [(u8, &[[usize; 4]]); 4] = [
     (TETRAHEDRON, &[[0, 1, 2, 3]]),
     (HEXAHEDRON, &[[0, 1, 2, 6], [0, 2, 3, 6], [0, 3, 7, 6], [0, 7, 4, 6], [0, 4, 5, 6], [0, 5, 1, 6]]),
@@ -59,7 +59,8 @@ pub fn corners_of(kind: u8) -> usize {
 }
 
 impl Solid {
-    /// A mesh; one of very many cells with fewer, `coarser` with fewer still. Cells of other types are left out.
+    /// A mesh; one of very many cells with fewer, `coarser` with fewer still. Cells of other types are left
+    /// out.
     pub fn mesh(points: &[[f64; 3]], cells: &Cells, coarser: usize) -> Self {
         let whole = Self::whole(points, cells);
         if whole.kinds.len() <= MOST && coarser <= 1 {
@@ -92,8 +93,8 @@ impl Solid {
         solid
     }
 
-    /// About `count` points: one for each cell of a grid, and the tetrahedra that keep four points (clusters of vertices:
-    /// Rossignac, Borrel 1993).
+    /// About `count` points: one for each cell of a grid, and the tetrahedra that keep four points (clusters
+    /// of vertices: Rossignac, Borrel 1993).
     fn coarse(&self, count: usize) -> Self {
         let [low, high] = polycore::numerics::bounds(self.points.iter().copied());
         let longest = (0..3).map(|d| high[d] - low[d]).fold(f64::MIN_POSITIVE, f64::max);
@@ -157,7 +158,7 @@ impl Solid {
         coarse
     }
 
-    /// With the cells of each type together.
+    /// Returns the same solid with its cells sorted by type.
     pub fn by_kind(mut self) -> Self {
         let mut starts = Vec::with_capacity(self.kinds.len());
         let mut first = 0;

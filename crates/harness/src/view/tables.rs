@@ -4,7 +4,8 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use crate::report::{Report, Value};
+use crate::case::fits;
+use crate::report::{Report, SceneUnits, Value};
 use polycore::Error;
 
 /// Rows of a table at most: longer ones are thinned.
@@ -15,10 +16,15 @@ const NUMBERS: usize = 80_000;
 /// Columns of numbers.
 #[derive(Debug, Serialize)]
 pub struct Table {
-    /// Its file without `.csv`, or the name of a curve.
+    /// File without `.csv`, or name of a curve.
     name: String,
     /// Row k is row k · `every` of the file.
     every: usize,
+    /// Place among the curves that the scene shows first.
+    main: Option<usize>,
+    /// Times of the rows, s, where the column is in another unit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    times: Option<Vec<Option<f64>>>,
     columns: Vec<Column>,
 }
 
@@ -32,7 +38,7 @@ struct Column {
 /// All tables of a page, and what had no room.
 #[derive(Debug, Default)]
 pub struct Tables {
-    /// In the order in which they came.
+    /// Tables in the order in which they came.
     pub tables: Vec<Table>,
     /// Names of those left out.
     pub left_out: Vec<String>,
@@ -80,6 +86,23 @@ impl Tables {
         }
     }
 
+    /// Converts columns to the units of a scene, and marks the curves that it lists.
+    pub fn prepare(&mut self, units: &SceneUnits, listed: &[String]) {
+        for table in &mut self.tables {
+            let plain = table.name.split('[').next().unwrap_or_default();
+            table.main = listed.iter().position(|name| fits(name, &table.name) || fits(name, plain));
+            for column in &mut table.columns {
+                let largest = column.data.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
+                let Some(unit) = units.shown(&column.unit, largest) else { continue };
+                if unit.factor != 1.0 && column.name == "time" {
+                    table.times = Some(column.data.clone());
+                }
+                column.data.iter_mut().flatten().for_each(|x| *x = rounded(*x * unit.factor));
+                column.unit = unit.name.to_owned();
+            }
+        }
+    }
+
     fn push(&mut self, name: &str, columns: Vec<(String, String, Vec<f64>)>) {
         let every = columns.first().map_or(1, |(_, _, data)| data.len().div_ceil(ROWS)).max(1);
         let columns: Vec<Column> = columns
@@ -100,13 +123,17 @@ impl Tables {
             return;
         }
         self.numbers += numbers;
-        self.tables.push(Table { name: name.to_owned(), every, columns });
+        self.tables.push(Table { name: name.to_owned(), every, main: None, times: None, columns });
     }
 }
 
 /// Six digits; none of what is not finite.
 fn short(number: f64) -> Option<f64> {
-    number.is_finite().then(|| format!("{number:.5e}").parse().unwrap_or(number))
+    number.is_finite().then(|| rounded(number))
+}
+
+fn rounded(number: f64) -> f64 {
+    format!("{number:.5e}").parse().unwrap_or(number)
 }
 
 #[cfg(test)]

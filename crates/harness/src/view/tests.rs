@@ -4,7 +4,7 @@ use polycore::random::SplitMix64;
 
 const MOST: usize = 5_000_000;
 
-/// What a page tells of its run.
+/// Returns the data of a page.
 fn told(page: &str) -> Json {
     let (_, rest) = page.split_once("<script type=\"application/json\" id=\"run\">").unwrap();
     serde_json::from_str(rest.split_once("</script>").unwrap().0).unwrap()

@@ -96,7 +96,9 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
     for name in &report.non_finite {
         let _ = writeln!(text, "FAIL  {name} is not finite");
     }
-    Ok(Finished { report, text })
+    let mut finished = Finished::new(report, text);
+    finished.table = (!all.is_empty()).then(|| errors(case, &all));
+    Ok(finished.with_notes(&remarks(&all)))
 }
 
 /// Converts a value to the unit of the tables: stresses to MPa, numbers unchanged.
@@ -247,23 +249,7 @@ fn summary(case: &FitCase, all: &[TableFits], report: &Report) -> String {
         set.read.iter().for_each(|line| text += &format!("{}: {line}\n", set.name));
     }
     if !all.is_empty() {
-        text += "rms of the nominal stress, over the measured stresses (their number in brackets); k: \
-                 parameters\n";
-        let _ = write!(text, "{:<22}{:>4}", "law", "k");
-        for set in all {
-            let head = format!("{} ({}), {}", set.name, set.table.measurements(), set.unit().0);
-            let _ = write!(text, "{head:>24}");
-        }
-        text.push('\n');
-        for model in &case.laws {
-            let _ = write!(text, "{:<22}{:>4}", model.key, model.parameters.len());
-            for set in all {
-                let fit = set.fits.iter().find(|fit| fit.model.key == model.key);
-                let rms = fit.map(|fit| digits(fit.rms / set.unit().1, 5));
-                let _ = write!(text, "{:>24}", rms.unwrap_or_else(|| "failed".to_owned()));
-            }
-            text.push('\n');
-        }
+        text += &errors(case, all);
     }
     for set in all {
         for (law, why) in &set.failed {
@@ -289,6 +275,41 @@ fn summary(case: &FitCase, all: &[TableFits], report: &Report) -> String {
     }
     for judgement in &report.expect {
         let _ = writeln!(text, "{}", judgement.row().join("  "));
+    }
+    text
+}
+
+/// Returns the table of the errors of all laws on all tables.
+fn errors(case: &Case, all: &[Set]) -> String {
+    let mut text =
+        "rms of the nominal stress, over the measured stresses (their number in brackets); k: parameters\n"
+            .to_owned();
+    let _ = write!(text, "{:<22}{:>4}", "law", "k");
+    for set in all {
+        let head = format!("{} ({}), {}", set.name, set.table.measurements(), set.unit().0);
+        let _ = write!(text, "{head:>24}");
+    }
+    text.push('\n');
+    for model in &case.laws {
+        let _ = write!(text, "{:<22}{:>4}", model.key, model.parameters.len());
+        for set in all {
+            let fit = set.fits.iter().find(|fit| fit.model.key == model.key);
+            let rms = fit.map(|fit| digits(fit.rms / set.unit().1, 5));
+            let _ = write!(text, "{:>24}", rms.unwrap_or_else(|| "failed".to_owned()));
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// Returns the laws that failed and the block of the best law, by table.
+fn remarks(all: &[Set]) -> String {
+    let mut text = String::new();
+    for set in all {
+        for (law, why) in &set.failed {
+            let _ = writeln!(text, "failed  {law} on {}: {why}", set.name);
+        }
+        text += &material::best(set.name, &set.fits);
     }
     text
 }

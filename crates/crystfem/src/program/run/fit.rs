@@ -81,13 +81,14 @@ pub fn run(source: &Source, scene: &FitScene, run: &mut harness::case::Run) -> R
     write_estimates(output, &done)?;
     phases.stop();
     report.phases(&phases).threads(1).judge(&scene.expect, quick);
-    let mut text = report.table();
+    let mut notes = String::new();
     for (one, block) in done.iter().filter_map(|one| Some((one, one.block()?))) {
         let path = output.join(format!("{}_kinetics.toml", one.name));
         atomic_write(&path, |file| file.write_all(block.as_bytes()))?;
-        text += &format!("for a material of a scene, {}:\n  {block}", path.display());
+        notes += &format!("for a material of a scene, {}:\n  {block}", path.display());
     }
-    Ok(Finished { report, text })
+    let text = report.table() + &notes;
+    Ok(Finished::new(report, text).with_notes(&notes))
 }
 
 /// What a scene will fit.

@@ -31,9 +31,11 @@ pub fn run(source: &Source, run: &mut Run) -> Result<Finished, Failure> {
         Kind::Point => self::point::run(source, &points(source)?, run).map(Finished::from),
         Kind::Fit => {
             let scene = fits(source)?;
-            let Finished { text, report } = self::fit::run(source, &scene, run)?;
-            let read: String = self::fit::read(source, &scene).map(|line| line + "\n").collect();
-            Ok(Finished { text: read + &text, report })
+            let mut finished = self::fit::run(source, &scene, run)?;
+            let read: Vec<String> = self::fit::read(source, &scene).collect();
+            finished.text = read.iter().map(|line| format!("{line}\n")).collect::<String>() + &finished.text;
+            finished.notes.splice(0..0, read);
+            Ok(finished)
         }
         Kind::Part => {
             let scene = source.parse::<PartScene>()?;

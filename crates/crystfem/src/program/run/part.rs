@@ -27,9 +27,10 @@ pub fn run(source: &Source, scene: &PartScene, run: &mut Run) -> Result<Finished
         rest.is_some_and(|(_, quantity)| STATISTICS.iter().any(|statistic| quantity.starts_with(statistic)))
     };
     let mut text = report.table_of(|name| !of_layer(name) && !name.contains("at_birth_"));
-    text += &warnings(&report);
-    text += &scene.cut_steps().map_or(String::new(), |cut| format!("warning: {cut}\n"));
-    Ok(Finished { text, report })
+    let cut = scene.cut_steps().map_or(String::new(), |cut| format!("warning: {cut}\n"));
+    let notes = warnings(&report) + &cut;
+    text += &notes;
+    Ok(Finished::new(report, text).with_notes(&notes))
 }
 
 /// Runs one scene, or one study of a scene, whose expectations wait for the others.

@@ -81,8 +81,9 @@ pub fn run(source: &Source, scene: &PartScene, run: &mut Run) -> Result<Finished
         }
     }
     table(&report, &studies, &rows, output)?;
-    let text = rows.text() + &report.verdict() + &survivors + &part::warnings(&report);
-    Ok(Finished { text, report })
+    let notes = survivors + &part::warnings(&report);
+    let text = rows.text() + &report.verdict() + &notes;
+    Ok(Finished::new(report, text).with_notes(&notes))
 }
 
 fn of_study(study: &str, quantities: Vec<Named>) -> impl Iterator<Item = Named> {

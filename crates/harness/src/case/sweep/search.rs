@@ -22,7 +22,7 @@ pub struct Search {
 impl FromStr for Search {
     type Err = String;
 
-    /// From `KEY=LOW..HIGH`, of one unit.
+    /// Parses `KEY=LOW..HIGH`, both in one unit.
     fn from_str(text: &str) -> Result<Self, String> {
         let refused = || {
             let usage =
@@ -39,8 +39,9 @@ impl FromStr for Search {
     }
 }
 
-/// Bisects for the least value with which all expectations of a scene are met, to a hundredth of the interval: as sweeps
-/// into one folder, which keeps what is finished. It is taken that a greater value is no worse.
+/// Bisects for the least value with which all expectations of a scene are met, to a hundredth of the
+/// interval: as sweeps into one folder, which keeps what is finished. It is taken that a greater value is no
+/// worse.
 ///
 /// # Errors
 /// As [`super::sweep`]; a scene without expectations.
@@ -61,7 +62,7 @@ pub fn search<C: Case>(
             return Err(Error::Option { option: format!("--search {key}"), reason }.into());
         }
         let first = rows.rows.iter().take(values.len()).map(met).collect();
-        Ok((first, Finished { text: rows.text(), report }))
+        Ok((first, Finished::new(report, rows.text())))
     };
     let (met, mut finished) = try_out(&[*low, *high])?;
     let verdict = match met[..] {

@@ -17,7 +17,7 @@ pub struct Shard {
     of: usize,
 }
 
-/// What of a sweep is computed.
+/// Part of a sweep to compute.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Part {
     /// All runs, and their table.
@@ -32,7 +32,7 @@ pub enum Part {
 impl FromStr for Shard {
     type Err = String;
 
-    /// From `I/N`.
+    /// Parses `I/N`.
     fn from_str(text: &str) -> Result<Self, String> {
         let numbers = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
         match numbers {
@@ -43,14 +43,14 @@ impl FromStr for Shard {
 }
 
 impl Shard {
-    /// Whether it has a run, counted from 0.
+    /// Returns whether the part contains a run, counted from 0.
     pub fn has(&self, run: usize) -> bool {
         run % self.of == self.index - 1
     }
 }
 
-/// Checks a sweep and writes `job.sh`, a SLURM job array of so many parts of it, into its folder; gives a line that says how
-/// to submit it. `command` is the command line of the sweep.
+/// Checks a sweep and writes `job.sh`, a SLURM job array of so many parts of it, into its folder; gives a
+/// line that says how to submit it. `command` is the command line of the sweep.
 ///
 /// # Errors
 /// Faults of the scene or of a key; the folder cannot be written to.

@@ -1,4 +1,4 @@
-//! What a sweep found: its report, and its pictures against the first key.
+//! Report of a sweep, and pictures of its values over the first key.
 
 use super::{FAILED_RUNS, Vary};
 use crate::case::Program;

@@ -17,13 +17,13 @@ pub(super) struct Bar {
     label: Text,
     below: bool,
     above: bool,
-    /// Of everything.
+    /// Title of the colour bar.
     pub(super) width: usize,
     pub(super) height: usize,
 }
 
 impl Bar {
-    /// Of values between `low` and `high`; `beyond`: whether some lie below, above.
+    /// Creates a bar for `low` to `high`; `beyond` says whether some values lie below, above.
     pub(super) fn new(
         label: &str,
         (low, high): (f64, f64),

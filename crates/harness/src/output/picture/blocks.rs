@@ -5,12 +5,12 @@ use rayon::prelude::*;
 
 use crate::output::lattice::{self, NONE, joined, neighbours};
 
-/// What a particle covers.
+/// Area that a particle covers.
 #[derive(Clone, Debug)]
 pub(super) enum Block {
-    /// How far it reaches to the left, right, down and up.
+    /// Distances to the left, right, lower and upper side.
     Upright([f64; 4]),
-    /// Its corners, in order around it.
+    /// Corners, in order around it.
     Cell([[f64; 2]; 4]),
 }
 
@@ -18,8 +18,8 @@ pub(super) enum Block {
 pub(super) struct Blocks(pub(super) Vec<Block>);
 
 impl Blocks {
-    /// Deformed cells of those that `reference` shows to be on a lattice, upright blocks of the others; neighbours
-    /// farther apart than `bridge` spacings have a crack between them.
+    /// Deformed cells of those that `reference` shows to be on a lattice, upright blocks of the others;
+    /// neighbours farther apart than `bridge` spacings have a crack between them.
     pub(super) fn new(
         positions: &[[f64; 2]],
         reference: Option<&[[f64; 2]]>,
@@ -39,8 +39,8 @@ impl Blocks {
     }
 }
 
-/// How far each particle's block reaches to the left, right, down and up: half the way to its neighbour there, or half
-/// a spacing where the next one is farther than `bridge` spacings (a surface, a hole, a crack).
+/// Returns the distances from each particle to the sides of its block: half the way to its neighbour there,
+/// or half a spacing where the next one is farther than `bridge` spacings (a surface, a hole, a crack).
 fn reach(positions: &[[f64; 2]], spacing: f64, bridge: f64) -> Vec<[f64; 4]> {
     let far = spacing * bridge.max(1.0) * (1.0 + 1e-9);
     let cells = Cells::new(positions, far);

@@ -20,7 +20,7 @@ pub(super) struct Canvas {
     pixels: Vec<Color>,
 }
 
-/// Which point of a text is given.
+/// Point of a text that its position gives.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Anchor {
     /// Middle of the left edge.
@@ -131,8 +131,8 @@ impl Canvas {
         }
     }
 
-    /// The least rectangle (left, top, width, height) outside of which nothing differs from an image of the same size; one
-    /// pixel where nothing does.
+    /// The least rectangle (left, top, width, height) outside of which nothing differs from an image of the
+    /// same size; one pixel where nothing does.
     fn difference(&self, other: &Self) -> [usize; 4] {
         let differs =
             |x: usize, y: usize| self.pixels[y * self.width + x] != other.pixels[y * self.width + x];
@@ -182,7 +182,8 @@ impl Canvas {
     }
 }
 
-/// An animated PNG of images of one size, one after another without end; the last is shown `rest` times as long.
+/// An animated PNG of images of one size, one after another without end; the last is shown `rest` times as
+/// long.
 ///
 /// # Errors
 /// Those of `frame`; no frame; what cannot be encoded.

@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use kuva::plot::ColorMap as Kuva;
 
-/// How numbers become colours.
+/// Map from numbers to colours.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ColorMap {
     /// Dark blue to yellow, perceptually uniform, legible in grey and to the colour-blind.
@@ -16,7 +16,7 @@ pub enum ColorMap {
     Diverging,
 }
 
-/// Of points without a number.
+/// Colour of points without a number.
 pub(super) const MISSING: [u8; 3] = [190, 190, 190];
 
 type Table = [[u8; 3]; 256];

@@ -22,7 +22,7 @@ const MARGIN: usize = 26;
 /// More pixels than this are a mistake.
 const LARGEST_PICTURE: usize = 200_000_000;
 
-/// One or more fields side by side in one PNG.
+/// Fields side by side in one PNG.
 ///
 /// ```
 /// # use harness::output::picture::{FieldMap, Panel};
@@ -44,7 +44,7 @@ pub struct FieldMap<'a> {
     names: [&'a str; 2],
 }
 
-/// One field: where the particles are (deformed or not) and what they carry.
+/// A field: positions of the particles (deformed or not) and their values.
 #[derive(Clone, Debug)]
 pub struct Panel<'a> {
     title: String,
@@ -59,8 +59,8 @@ pub struct Panel<'a> {
 }
 
 impl<'a> Panel<'a> {
-    /// `label` stands beside the colour bar, with its unit; `spacing` is the lattice spacing in the unit of the
-    /// positions. Particles whose value is NaN are grey.
+    /// `label` stands beside the colour bar, with its unit; `spacing` is the lattice spacing in the unit of
+    /// the positions. Particles whose value is NaN are grey.
     pub fn new(title: &str, label: &str, positions: &'a [[f64; 2]], values: &'a [f64], spacing: f64) -> Self {
         Self {
             title: title.to_owned(),
@@ -81,21 +81,22 @@ impl<'a> Panel<'a> {
         self
     }
 
-    /// Values outside take the colours of the ends, and the bar gets a point there; by default all values are inside.
+    /// Values outside take the colours of the ends, and the bar gets a point there; by default all values are
+    /// inside.
     pub fn range(mut self, low: f64, high: f64) -> Self {
         self.range = Some((low, high));
         self
     }
 
-    /// Where the particles were before the deformation: those with neighbours one spacing away along the axes are drawn
-    /// as deformed cells, the others as upright blocks.
+    /// Sets the positions before the deformation: particles with neighbours one spacing away along the axes
+    /// are drawn as deformed cells, the others as upright blocks.
     pub fn reference(mut self, positions: &'a [[f64; 2]]) -> Self {
         self.reference = Some(positions);
         self
     }
 
-    /// Neighbours up to this many spacings apart are drawn without a gap; farther apart there is a crack. By default
-    /// 1.5; larger stretches need more.
+    /// Neighbours up to this many spacings apart are drawn without a gap; farther apart there is a crack. By
+    /// default 1.5; larger stretches need more.
     pub fn bridge(mut self, spacings: f64) -> Self {
         self.bridge = spacings;
         self
@@ -105,7 +106,7 @@ impl<'a> Panel<'a> {
         Blocks::new(self.positions, self.reference, self.spacing, self.bridge)
     }
 
-    /// Whether it shows the same particles in the same places.
+    /// Returns whether it shows the same particles in the same places.
     fn has_outline_of(&self, other: &Self) -> bool {
         let same = |a: &[[f64; 2]], b: &[[f64; 2]]| std::ptr::eq(a, b);
         let reference = match (self.reference, other.reference) {
@@ -202,13 +203,14 @@ impl<'a> FieldMap<'a> {
         self
     }
 
-    /// Draws axes: positions are divided by `factor` and given in `unit`. `("mm", 1e-3)` for positions in metres.
+    /// Draws axes: positions are divided by `factor` and given in `unit`. `("mm", 1e-3)` for positions in
+    /// metres.
     pub fn lengths(mut self, unit: &str, factor: f64) -> Self {
         self.lengths = Some((unit.to_owned(), factor));
         self
     }
 
-    /// What the axes are called; `x` and `y` by default.
+    /// Sets the names of the axes; `x` and `y` by default.
     pub fn axes(mut self, names: [&'a str; 2]) -> Self {
         self.names = names;
         self
@@ -217,8 +219,8 @@ impl<'a> FieldMap<'a> {
     /// Writes a `.png`, whole or not at all.
     ///
     /// # Errors
-    /// [`Error::Data`] for another extension, without panels, for arrays of different lengths, positions that are not
-    /// finite or too far apart, invalid spacings and ranges; [`Error::Io`].
+    /// [`Error::Data`] for another extension, without panels, for arrays of different lengths, positions that
+    /// are not finite or too far apart, invalid spacings and ranges; [`Error::Io`].
     pub fn write(&self, path: impl AsRef<Path>) -> Result<(), Error> {
         let path = path.as_ref();
         let fail = |reason: String| picture_error(path, reason);

@@ -26,7 +26,7 @@ pub struct LinePlot {
     pub(super) series: Vec<Series>,
 }
 
-/// Where the names of the series stand.
+/// Position of the legend.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum LegendPlace {

@@ -1,4 +1,4 @@
-//! From particles to whole pixels.
+//! Drawing of particles as whole pixels.
 
 use super::blocks::{Block, Blocks};
 use polycore::numerics::{bounds, range};
@@ -10,8 +10,8 @@ pub(super) struct Window {
     pub(super) low: [f64; 2],
     /// Upper right corner.
     pub(super) high: [f64; 2],
-    /// Pixels per unit of length; a lattice spacing is a whole number of pixels, or a whole number of spacings is a
-    /// pixel: any other ratio beats with the lattice (moiré).
+    /// Pixels per unit of length; a lattice spacing is a whole number of pixels, or a whole number of
+    /// spacings is a pixel: any other ratio beats with the lattice (moiré).
     pub(super) scale: f64,
 }
 
@@ -115,7 +115,7 @@ impl Window {
     }
 }
 
-/// Whether a triangle, edges included, holds a point.
+/// Returns whether a triangle, edges included, contains a point.
 fn inside(triangle: [[f64; 2]; 3], point: [f64; 2]) -> bool {
     let side = |k: usize| {
         let ([a, b], [c, d]) = (triangle[k], triangle[(k + 1) % 3]);
@@ -212,7 +212,8 @@ mod tests {
         assert_eq!(open, 2 * pixels);
     }
 
-    /// Deformed cells of a lattice, where upright blocks leave holes: stretched to the double, sheared, turned, and bent.
+    /// Deformed cells of a lattice, where upright blocks leave holes: stretched to the double, sheared,
+    /// turned, and bent.
     #[test]
     fn deformed_cells_have_no_holes() {
         let rest = lattice(60, 40, |i, j| [i, j]);
@@ -239,7 +240,7 @@ mod tests {
         }
     }
 
-    /// Of a stretched sheet a crack is drawn open, and a lattice at rest as upright blocks would be.
+    /// A crack of a stretched sheet is drawn open, and a lattice at rest as upright blocks.
     #[test]
     fn deformed_cells_show_cracks() {
         let rest = lattice(60, 40, |i, j| [i, j]);

@@ -17,7 +17,8 @@ use polycore::file::atomic_write;
 
 /// Pixels of a PNG for each unit of the layout.
 const PIXELS: f64 = 2.0;
-/// Okabe & Ito's colours, told apart by the colour-blind (<https://jfly.uni-koeln.de/color/>); black is for references.
+/// Okabe & Ito's colours, told apart by the colour-blind (<https://jfly.uni-koeln.de/color/>); black is for
+/// references.
 const COLORS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f"];
 const GRID: &str = "#dddddd";
 const TITLE: u32 = 15;
@@ -51,8 +52,8 @@ impl LinePlot {
     /// Writes a `.png` or `.svg`, whole or not at all.
     ///
     /// # Errors
-    /// [`Error::Data`] for another extension, for nothing to draw, for infinite numbers and for numbers ≤ 0 on a
-    /// logarithmic axis; [`Error::Io`].
+    /// [`Error::Data`] for another extension, for nothing to draw, for infinite numbers and for numbers ≤ 0
+    /// on a logarithmic axis; [`Error::Io`].
     pub fn write(&self, path: impl AsRef<Path>) -> Result<(), Error> {
         let path = path.as_ref();
         self.check().map_err(|reason| picture_error(path, reason))?;
@@ -82,7 +83,7 @@ impl LinePlot {
     }
 }
 
-/// Everything but the label of the y axis.
+/// Draws all but the label of the y axis.
 fn scene(plot: &LinePlot) -> Result<(Scene, UprightLabel), String> {
     let (width, height) = plot.size;
     let values = |pick: fn(&(f64, f64)) -> f64| plot.series.iter().flat_map(|s| s.runs()).flatten().map(pick);

@@ -1,4 +1,4 @@
-//! From faces to pixels: parallel projection, depth buffer, light and colour.
+//! Rendering of faces: parallel projection, depth buffer, light and colour.
 
 use super::canvas::Canvas;
 use super::skin::{Face, Skin, cross, dot, minus};
@@ -33,12 +33,12 @@ pub(super) struct Camera {
 pub(super) struct Sight<'a> {
     skin: &'a Skin,
     camera: Camera,
-    /// In pixels.
+    /// Width and height, pixels.
     size: [usize; 2],
     depth: Vec<f32>,
     /// Twice the face, and one more in its second triangle.
     seen: Vec<u32>,
-    /// Whether any sample sees a face.
+    /// Returns whether any sample shows a face.
     visible: Vec<bool>,
 }
 
@@ -46,7 +46,8 @@ pub(super) struct Sight<'a> {
 struct Flat {
     corners: [[f64; 3]; 4],
     light: f64,
-    /// Loss of brightness at its edges, and the edges: a point, a direction, the limit of the cross product with both.
+    /// Loss of brightness at its edges, and the edges: a point, a direction, the limit of the cross product
+    /// with both.
     edge: f64,
     edges: [Option<[f64; 5]>; 4],
 }
@@ -193,7 +194,7 @@ fn covered(
 }
 
 impl Flat {
-    /// Whether a sample lies within half a pixel of an edge.
+    /// Returns whether a sample lies within half a pixel of an edge.
     fn is_edge(&self, p: [f64; 2]) -> bool {
         let near =
             |[x, y, along, across, most]: [f64; 5]| (along * (p[1] - y) - across * (p[0] - x)).abs() < most;
@@ -219,7 +220,8 @@ mod tests {
         Strip { label: String::new(), range: (0.0, 1.0), colors: ColorMap::Viridis }
     }
 
-    /// The unit cube, each side of another value; edges are too few pixels away to matter in the middle of a side.
+    /// The unit cube, each side of another value; edges are too few pixels away to matter in the middle of a
+    /// side.
     fn cube(cut: Option<Plane>) -> Skin {
         let mut skin = Skin::new(cut);
         for side in 0..6 {
@@ -239,7 +241,8 @@ mod tests {
             .map(|[a, e]: [f64; 2]| View { azimuth: a.to_radians(), elevation: e.to_radians() })
     }
 
-    /// A cube covers Σ |n_d| times the square of its side, n towards the viewer, and is Σ |e_d| wide and high: the axes are equal.
+    /// A cube covers Σ |n_d| times the square of its side, n towards the viewer, and is Σ |e_d| wide and
+    /// high: the axes are equal.
     #[test]
     fn a_cube_covers_what_it_must() {
         for view in views() {
@@ -288,7 +291,7 @@ mod tests {
         }
     }
 
-    /// Who stands in front is seen, in whichever order faces come.
+    /// The nearest face is shown, in any order of faces.
     #[test]
     fn the_nearest_face_is_seen() {
         let square = |y: f64, size: f64, value: f64| {
@@ -340,7 +343,8 @@ mod tests {
         assert_eq!(paint(&skin, 1), (MISSING.map(|x| (light * f64::from(x)).round() as u8), [false; 2]));
     }
 
-    /// Without its front half the cube shows the back side's inside, and where cells are cut, what they hold there.
+    /// Without its front half the cube shows the back side's inside, and where cells are cut, what they hold
+    /// there.
     #[test]
     fn a_cut_shows_the_inside() {
         let view = View::default();

@@ -12,7 +12,7 @@ pub struct Corner {
 /// A plane normal · x = at. It removes points with larger values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
-    /// Of any length but 0.
+    /// Normal vector of any length but 0.
     pub normal: [f64; 3],
     /// Distance from the origin along the normal, in lengths of the normal.
     pub at: f64,
@@ -110,7 +110,8 @@ impl Skin {
         self.push(&kept);
     }
 
-    /// Adds the section of the plane through a cell: a tetrahedron (four corners) or a hexahedron (eight corners, order of VTK).
+    /// Adds the section of the plane through a cell: a tetrahedron (four corners) or a hexahedron (eight
+    /// corners, order of VTK).
     pub fn section(&mut self, cell: &[Corner]) {
         let Some(plane) = self.cut else { return };
         let mut found: Vec<Corner> = Vec::new();
@@ -195,8 +196,8 @@ mod tests {
         (twice, error)
     }
 
-    /// Sections of bricks and of the tetrahedra in them, by planes through corners, edges and insides, have the area that
-    /// a box has there, and the linear field that is at the corners.
+    /// Sections of bricks and of the tetrahedra in them, by planes through corners, edges and insides, have
+    /// the area that a box has there, and the linear field that is at the corners.
     #[test]
     fn sections_fill_the_plane() {
         let field = |x: [f64; 3]| 1.0 + 2.0 * x[0] - x[1] + 0.5 * x[2];
@@ -238,7 +239,7 @@ mod tests {
         }
     }
 
-    /// Of a face that the plane crosses one side is left, and an edge runs along the cut.
+    /// A face that the plane crosses keeps one side, with an edge along the cut.
     #[test]
     fn faces_are_clipped() {
         let corners = [[0.0, 0.0], [4.0, 0.0], [4.0, 1.0], [0.0, 1.0]]

@@ -32,8 +32,8 @@ const COLORS: [Color; 3] = [[190, 40, 40], [30, 130, 50], [40, 70, 190]];
 /// More pixels than this are a mistake.
 const LARGEST: f64 = 1e8;
 
-/// Solids with one or two fields, under common colour bars and at one scale: stages beside one another, or one after another
-/// as an animation.
+/// Solids with one or two fields, under common colour bars and at one scale: stages beside one another, or
+/// one after another as an animation.
 ///
 /// ```
 /// # use harness::output::picture::{ColorMap, Corner, Skin, Solids, Strip, View};
@@ -96,8 +96,8 @@ impl Solids {
     /// Writes stages beside one another into a `.png`, whole or not at all.
     ///
     /// # Errors
-    /// [`Error::Data`] for no stage, no or more than two fields, invalid bounds, ranges and units; those of `stage`;
-    /// [`Error::Io`].
+    /// [`Error::Data`] for no stage, no or more than two fields, invalid bounds, ranges and units; those of
+    /// `stage`; [`Error::Io`].
     pub fn write(
         &self,
         path: impl AsRef<Path>,
@@ -122,8 +122,8 @@ impl Solids {
         atomic_write(path, |file| file.write_all(&bytes))
     }
 
-    /// Writes frames one after another into an animated `.png`. It repeats without end and rests on the last frame;
-    /// viewers that know no animation show the first.
+    /// Writes frames one after another into an animated `.png`. It repeats without end and rests on the last
+    /// frame; viewers that know no animation show the first.
     ///
     /// # Errors
     /// As [`Self::write`].
@@ -173,7 +173,8 @@ impl Solids {
         atomic_write(path, |file| file.write_all(&bytes))
     }
 
-    /// Draws a stage of all fields, and the axes; returns whether visible values lie below, above the range of each field.
+    /// Draws a stage of all fields, and the axes; returns whether visible values lie below, above the range
+    /// of each field.
     fn paint(
         &self,
         layout: &Layout,
@@ -372,7 +373,7 @@ mod tests {
         (format!("{index} s"), skin)
     }
 
-    /// What an animation shows, frame after frame over what was there: the pictures of its stages.
+    /// The frames of an animation, drawn over each other, are the pictures of its stages.
     #[test]
     fn animations_hold_their_frames() {
         let directory = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! Fields on regular rasters side by side under common colour bars: stages below one another, or one after another
-//! as an animation.
+//! Fields on regular rasters side by side under common colour bars: stages below one another, or one after
+//! another as an animation.
 
 use std::io::Write;
 use std::path::Path;
@@ -24,7 +24,7 @@ const LEVELS: usize = 120;
 /// More pixels than this are a mistake.
 const LARGEST: usize = 100_000_000;
 
-/// What all stages share. A sample is a pixel.
+/// Data shared by all stages. A sample is a pixel.
 ///
 /// ```
 /// # use harness::output::picture::{ColorMap, Strip, Strips};
@@ -73,7 +73,8 @@ pub struct Strip {
     pub colors: ColorMap,
 }
 
-/// The values of a stage: a title, and for each field a value a sample, row by row from below; NaN where nothing is.
+/// The values of a stage: a title, and for each field a value a sample, row by row from below; NaN where
+/// nothing is.
 pub type Stage = (String, Vec<Vec<f64>>);
 
 /// Palette indices of a picture.
@@ -97,8 +98,8 @@ impl Strips<'_> {
         atomic_write(path, |file| file.write_all(&bytes))
     }
 
-    /// Writes frames one after another into an animated `.png`. It repeats without end and rests on the last frame;
-    /// viewers that know no animation show the first.
+    /// Writes frames one after another into an animated `.png`. It repeats without end and rests on the last
+    /// frame; viewers that know no animation show the first.
     ///
     /// # Errors
     /// As [`Self::write`]; those of `frame`.
@@ -319,7 +320,7 @@ mod tests {
         (format!("{value} s"), vec![field.clone(), field])
     }
 
-    /// What is written is read again: the frames, their colours, white where nothing is.
+    /// An animation is read back: frames, colours, white background.
     #[test]
     fn animations_hold_their_frames() {
         let directory = tempfile::tempdir().unwrap();

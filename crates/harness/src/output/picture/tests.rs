@@ -51,7 +51,7 @@ fn convergence() -> LinePlot {
     plot.series(Series::markers("measured", &h, &h.map(|h| 0.02 * h))).legend(LegendPlace::TopLeft)
 }
 
-/// What `xtask bench langevin` draws: sixteen decades of error.
+/// Sixteen decades of error, as `xtask bench langevin` draws.
 fn errors() -> LinePlot {
     let time = [1.2, 3.4, 5.0, 8.1, 20.0];
     LinePlot::new("Inverse Langevin function: error against time")

@@ -8,7 +8,7 @@ use polycore::Error;
 pub struct Cells {
     /// Points of all cells, one cell after another, in VTK's order.
     pub connectivity: Vec<u32>,
-    /// Where each cell ends in `connectivity`.
+    /// End of each cell in `connectivity`.
     pub ends: Vec<usize>,
     /// VTK's number of each cell's type: 10 tetrahedron, 12 hexahedron.
     pub types: Vec<u8>,
@@ -27,7 +27,7 @@ impl Cells {
         self.types.len()
     }
 
-    /// Whether there is none.
+    /// Returns whether there is no cell.
     pub fn is_empty(&self) -> bool {
         self.types.is_empty()
     }
@@ -55,6 +55,6 @@ pub struct Step<'a> {
     pub points: Option<Rows<'a>>,
     pub arrays: Vec<Rows<'a>>,
     pub cell_arrays: Vec<Rows<'a>>,
-    /// In the order of the layout.
+    /// Arrays in the order of the layout.
     pub moments: Vec<f64>,
 }

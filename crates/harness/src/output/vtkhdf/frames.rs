@@ -19,7 +19,7 @@ pub struct Frames {
     steps: usize,
     last_time: f64,
     layout: Option<Layout>,
-    /// Of a mesh: what stands still.
+    /// Points and cells of a mesh, equal in all steps.
     mesh: Option<(Vec<[f64; 3]>, Cells)>,
 }
 

@@ -19,7 +19,8 @@ impl MeshSeries {
     /// Begins a series that will end as `path` (`….vtkhdf`); removes what an earlier run left there.
     ///
     /// # Errors
-    /// [`Error::Data`] for a mesh that does not fit together, [`Error::Io`] if the directory cannot be prepared.
+    /// [`Error::Data`] for a mesh that does not fit together, [`Error::Io`] if the directory cannot be
+    /// prepared.
     pub fn create(path: impl AsRef<Path>, points: Vec<[f64; 3]>, cells: Cells) -> Result<Self, Error> {
         let counts = counts(&points, &cells)?;
         Ok(Self { frames: Frames::create(path.as_ref(), Some((points, cells)))?, counts })
@@ -28,7 +29,8 @@ impl MeshSeries {
     /// Continues a series of the same mesh after its first `steps_done` steps; discards later ones.
     ///
     /// # Errors
-    /// As [`MeshSeries::create`]; [`Error::Data`] if fewer steps than that exist, [`Error::Format`] if one is damaged.
+    /// As [`MeshSeries::create`]; [`Error::Data`] if fewer steps than that exist, [`Error::Format`] if one is
+    /// damaged.
     pub fn resume(
         path: impl AsRef<Path>,
         points: Vec<[f64; 3]>,
@@ -44,10 +46,12 @@ impl MeshSeries {
         self.frames.steps()
     }
 
-    /// Writes the next step as a complete file. `time` grows from step to step; all steps have the same arrays.
+    /// Writes the next step as a complete file. `time` grows from step to step; all steps have the same
+    /// arrays.
     ///
     /// # Errors
-    /// [`Error::Data`] if the arrays do not fit the mesh, [`Error::Io`] or [`Error::Format`] if writing fails.
+    /// [`Error::Data`] if the arrays do not fit the mesh, [`Error::Io`] or [`Error::Format`] if writing
+    /// fails.
     pub fn step(&mut self, time: f64, point_data: &[Data<'_>], cell_data: &[Data<'_>]) -> Result<(), Error> {
         let layout = Layout::of(self.counts, point_data, cell_data)?;
         let [arrays, cell_arrays] = [point_data, cell_data]

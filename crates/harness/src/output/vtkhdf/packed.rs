@@ -1,4 +1,5 @@
-//! The rows of a step in a dataset: one chunk, packed here, on all threads, and copied packed from file to file.
+//! The rows of a step in a dataset: one chunk, packed here, on all threads, and copied packed from file to
+//! file.
 
 use std::borrow::Cow;
 use std::io::Write;
@@ -7,15 +8,16 @@ use flate2::{Compression, write::ZlibEncoder};
 use rayon::prelude::*;
 use rust_hdf5::{H5Dataset, H5File, Hdf5Error};
 
-/// Deflate's level: the last bits of measured numbers cannot be packed, and higher levels take long to find that out.
+/// Deflate's level: the last bits of measured numbers cannot be packed, and higher levels take long to find
+/// that out.
 pub const LEVEL: u32 = 2;
 /// HDF5's numbers of the filters shuffle and deflate.
 const FILTERS: [u16; 2] = [2, 1];
 /// Bytes that are sorted at a time, before they are packed.
 const BLOCK: usize = 1 << 16;
 
-/// Whether an array of so many components is stored in single precision: second-order tensors, the bulk of a file, whose seventh
-/// digit no one needs.
+/// Returns whether an array of so many components is stored in single precision: second-order tensors, the
+/// bulk of a file, whose seventh digit no one needs.
 pub fn is_single(components: usize) -> bool {
     components == 9
 }
@@ -27,23 +29,24 @@ pub struct Table {
     columns: usize,
 }
 
-/// What is written of a step.
+/// Values of a step as they are written.
 pub enum Rows<'a> {
-    /// As they are.
+    /// Double precision.
     Values(Cow<'a, [f64]>),
     /// Packed as [`Table::write`] does it.
     Packed(Vec<u8>),
 }
 
 impl Table {
-    /// Of so many rows a step and so many components.
+    /// Creates an array of so many rows per step and so many components.
     pub fn new(dataset: H5Dataset, rows: usize, columns: usize) -> Self {
         Self { dataset, rows, columns }
     }
 
     /// Writes the step `at` of each table.
     pub fn write(all: Vec<(&Self, Rows<'_>)>, at: usize) -> Result<(), Hdf5Error> {
-        // as many at a time as there are threads: packed arrays are nearly as large as those that the caller holds
+        // as many at a time as there are threads: packed arrays are nearly as large as those that the caller
+        // holds
         for some in all.chunks(rayon::current_num_threads()) {
             let work: Vec<(usize, &Rows<'_>)> =
                 some.iter().map(|(table, rows)| (table.columns, rows)).collect();
@@ -60,7 +63,8 @@ impl Table {
         if self.columns == 1 { vec![at] } else { vec![at, 0] }
     }
 
-    /// The step `at` of the same dataset of another file as it is packed there, if it is stored in the same way.
+    /// The step `at` of the same dataset of another file as it is packed there, if it is stored in the same
+    /// way.
     pub fn same_of(&self, file: &H5File, name: &str, at: usize) -> Option<Vec<u8>> {
         let other = file.dataset(name).ok()?;
         let chunk = if self.columns == 1 { vec![self.rows] } else { vec![self.rows, self.columns] };
@@ -78,7 +82,7 @@ impl Table {
 }
 
 impl Rows<'_> {
-    /// Of so many components, as HDF5's filters pack them.
+    /// Packs an array of so many components with HDF5's filters.
     fn packed(&self, components: usize) -> Cow<'_, [u8]> {
         let values = match self {
             Rows::Values(values) => values,

@@ -36,11 +36,12 @@ impl ParticleSeries {
         self.frames.steps()
     }
 
-    /// Writes the next step as a complete file. `time` grows from step to step; all steps have the same number of
-    /// points and the same arrays.
+    /// Writes the next step as a complete file. `time` grows from step to step; all steps have the same
+    /// number of points and the same arrays.
     ///
     /// # Errors
-    /// [`Error::Data`] if the arrays do not fit together or a value is not finite, [`Error::Io`] if writing fails.
+    /// [`Error::Data`] if the arrays do not fit together or a value is not finite, [`Error::Io`] if writing
+    /// fails.
     pub fn step(&mut self, time: f64, points: &[[f64; 3]], point_data: &[Data<'_>]) -> Result<(), Error> {
         self.moment(time, points, point_data, &[])
     }
@@ -77,8 +78,8 @@ impl ParticleSeries {
     /// Merges all steps into the one transient file and removes the frames; returns its path.
     ///
     /// # Errors
-    /// [`Error::Data`] without any step; [`Error::Io`] or [`Error::Format`] if a frame has vanished or been damaged,
-    /// in which case the frames stay.
+    /// [`Error::Data`] without any step; [`Error::Io`] or [`Error::Format`] if a frame has vanished or been
+    /// damaged, in which case the frames stay.
     pub fn finish(self) -> Result<PathBuf, Error> {
         self.frames.finish()
     }

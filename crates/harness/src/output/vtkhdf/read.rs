@@ -14,7 +14,7 @@ pub struct Series {
     path: PathBuf,
     file: H5File,
     times: Vec<f64>,
-    /// Where the points of each step begin.
+    /// First point of each step.
     offsets: Vec<usize>,
     moves: bool,
     /// Numbers of the steps as a whole.
@@ -155,7 +155,7 @@ impl Series {
         }
     }
 
-    /// Whether points have a position for each step.
+    /// Returns whether points have a position for each step.
     pub fn moves(&self) -> bool {
         self.moves
     }

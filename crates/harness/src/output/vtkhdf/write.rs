@@ -1,4 +1,4 @@
-//! One transient VTKHDF file of known length.
+//! Transient VTKHDF file of known length.
 
 use std::path::{Path, PathBuf};
 
@@ -18,7 +18,7 @@ pub struct Writer {
     file: Created,
     group: H5Group,
     layout: Layout,
-    /// Where points move.
+    /// Positions of points that move.
     points: Option<Table>,
     arrays: Vec<Table>,
     cell_arrays: Vec<Table>,

@@ -49,8 +49,9 @@ pub fn run(source: &Source, run: &mut Run) -> Result<Finished, Failure> {
     }
     phases.stop();
     report.phases(&phases).threads(1).judge(&scene.expect, quick);
-    let text = remarks.iter().fold(report.table(), |text, line| text + line + "\n");
-    Ok(Finished { report, text })
+    let notes: String = remarks.iter().map(|line| format!("{line}\n")).collect();
+    let text = report.table() + &notes;
+    Ok(Finished::new(report, text).with_notes(&notes))
 }
 
 /// Measures data, trains and judges laws on them, searches.

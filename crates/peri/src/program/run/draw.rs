@@ -29,11 +29,15 @@ pub fn curves(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), 
     let mut cost = LinePlot::new("Error against run time").log_x().log_y().size(1000.0, 560.0);
     cost = cost.axes("build + solve + stress (s)", error_axis);
     let mut rows: Vec<Vec<f64>> = vec![Vec::new(); 5];
+    let convergence = |title: &str| {
+        let plot = LinePlot::new(title).log_x().log_y().size(900.0, 500.0);
+        plot.axes("spacing Δx (mm)", error_axis)
+    };
+    let title = "Stress error of the plate with a hole";
+    let mut together = convergence(title);
     for (index, measure) in stress.measures.iter().enumerate().filter(|(_, m)| **m != Measure::AsPublished) {
         let name = measure.name();
-        let mut convergence = LinePlot::new(&format!("Stress error of the plate with a hole, {name}"));
-        convergence = convergence.log_x().log_y().size(900.0, 500.0);
-        convergence = convergence.axes("spacing Δx (mm)", error_axis);
+        let mut single = convergence(&format!("{title}, {name}"));
         for (family, members) in &families {
             let error: Vec<f64> = members.iter().filter_map(|o| o.get(&format!("{name}_{kind}"))).collect();
             let spacing: Vec<f64> = members.iter().map(|o| o.spacing * 1e3).collect();
@@ -44,10 +48,16 @@ pub fn curves(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), 
                     column.push(value);
                 }
             }
-            convergence = convergence.series(Series::marked_line(family, &spacing, &error));
+            single = single.series(Series::marked_line(family, &spacing, &error));
+            together = together.series(Series::marked_line(name, &spacing, &error));
             cost = cost.series(Series::marked_line(&format!("{name} {family}"), &seconds, &error));
         }
-        convergence.write(output.join(format!("convergence_{name}.png")))?;
+        if families.len() > 1 {
+            single.write(output.join(format!("convergence_{name}.png")))?;
+        }
+    }
+    if families.len() == 1 {
+        together.write(output.join("convergence.png"))?;
     }
     cost.write(output.join("error_against_time.png"))?;
     let names = [("spacing", "mm"), ("horizon_ratio", ""), ("measure", ""), ("run_time", "s"), (kind, "")];
@@ -76,6 +86,7 @@ fn profiles(
         plot = plot.series(Series::markers(&format!("long strip, Heywood: {peak:.3}"), &[1.0], &[peak]));
     }
     let first = outcomes.first().map(|o| o.family.clone());
+    let mut columns: Vec<(&str, &str, Vec<f64>)> = vec![("spacing", "m", Vec::new()), ("y", "m", Vec::new())];
     for outcome in outcomes.iter().filter(|o| Some(&o.family) == first.as_ref()) {
         if let Some(profile) = outcome.profiles.iter().find(|p| p.name == measure) {
             let keep = profile.at.iter().filter(|&&y| y <= far).count();
@@ -83,10 +94,21 @@ fn profiles(
             plot =
                 plot.series(Series::line(&label, &over_radius(&profile.at[..keep]), &profile.value[..keep]));
         }
+        // all profiles of a variant are at the same particles
+        let rows = outcome.profiles.first().map_or(0, |profile| profile.at.len());
+        columns[0].2.extend(std::iter::repeat_n(outcome.spacing, rows));
+        columns[1].2.extend(outcome.profiles.iter().take(1).flat_map(|profile| &profile.at));
         for profile in &outcome.profiles {
-            let path = output.join(format!("profile_{}_{}.csv", profile.name, outcome.file_name()));
-            csv::write(path, &[("y", "m", &profile.at), ("stress_ratio", "", &profile.value)])?;
+            if !columns.iter().any(|column| column.0 == profile.name) {
+                columns.push((&profile.name, "", Vec::new()));
+            }
+            let column = columns.iter_mut().find(|column| column.0 == profile.name);
+            column.into_iter().for_each(|column| column.2.extend(&profile.value));
         }
+    }
+    let views: Vec<_> = columns.iter().map(|(name, unit, data)| (*name, *unit, data.as_slice())).collect();
+    if !columns[1].2.is_empty() {
+        csv::write(output.join("profile.csv"), &views)?;
     }
     let kirsch = ("Kirsch, infinite plate", over_radius(&line), exact);
     let finest = outcomes.iter().rfind(|o| Some(&o.family) == first.as_ref());

@@ -43,9 +43,14 @@ pub struct Finished {
 }
 
 impl Finished {
+    /// Returns warnings and remarks, a line each.
+    pub fn notes(&self) -> String {
+        compare::notes(&self.outcomes)
+    }
+
     /// For the terminal: all values of a single variant, a line for each of several, then the judged expectations.
     pub fn summary(&self) -> String {
-        let notes = compare::notes(&self.outcomes);
+        let notes = self.notes();
         if self.outcomes.len() == 1 {
             self.report.table() + &history::peak_lines(&self.outcomes) + &notes
         } else {

@@ -37,7 +37,8 @@ impl Case for Peri {
 
     fn solve(source: &Source, own: &mut Run) -> Result<Finished, Failure<Error>> {
         let finished = run(source, &source.parse::<Scene>()?, own)?;
-        Ok(Finished { text: finished.summary(), report: finished.report })
+        let (text, notes) = (finished.summary(), finished.notes());
+        Ok(Finished::new(finished.report, text).with_notes(&notes))
     }
 
     fn bulky(_: &Source) -> &'static [&'static str] {
