@@ -146,7 +146,7 @@ fn refused(bytes: &[u8], arguments: &str) -> Ended {
 #[test]
 fn files_that_are_no_text() {
     refused(b"version = 1\n\xff\xfe", "").tells("scene.toml: is not UTF-8 text (byte 12, line 2)");
-    refused(b"version = 1\n", "").tells("`program` is missing");
+    refused(b"version = 1\n", "").tells("missing `program`");
     refused(b"version = 1\n\0\x01\x02", "").tells("not valid TOML");
     refused(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "").tells("is not UTF-8 text (byte 0, line 1)");
     refused(&b"# padding\n".repeat(2_000_000), "").tells("is larger than 16 MiB");
@@ -160,7 +160,7 @@ fn nesting_without_end() {
     refused(deep("a = ", "{ b = ", "").as_bytes(), "").tells("not valid TOML");
     // a line longer than the 65535 columns of the pictures
     refused(deep("[a", ".a", "]\n").as_bytes(), "").tells("scene.toml:2");
-    refused(deep("title = \"", "long", "\"\n").as_bytes(), "").tells("`program` is missing");
+    refused(deep("title = \"", "long", "\"\n").as_bytes(), "").tells("missing `program`");
 }
 
 /// A valid scene cut anywhere is refused, or is itself valid (where only a trailing part is gone); it never panics.
@@ -197,7 +197,7 @@ fn what_is_not_a_file() {
             .tells("there is no directory nowhere either");
         if cfg!(unix) {
             peri(&format!("{verb} /dev/zero"), here).with_code(2).tells("is larger than 16 MiB");
-            peri(&format!("{verb} /dev/null"), here).with_code(2).tells("`version` is missing");
+            peri(&format!("{verb} /dev/null"), here).with_code(2).tells("missing `version`");
         }
     }
     assert!(!here.join("out").exists());

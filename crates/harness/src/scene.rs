@@ -152,6 +152,32 @@ impl Source {
         SceneError::value(self, &key, span, &found.to_string(), &allowed.to_string())
     }
 
+    /// Returns the error "missing `key`: why", at the nearest existing parent of the key.
+    ///
+    /// `why` says what needs it and what to write:
+    /// `source.missing("body.thickness", "a plane body needs it; write a length")`.
+    pub fn missing(&self, key: &str, why: impl ToString) -> SceneError {
+        let (key, span) = self.place(key);
+        SceneError::missing(self, key, span, &why.to_string())
+    }
+
+    /// Returns the error "unexpected `key`: why", at the key.
+    ///
+    /// `why` says what the key belongs to and what to do:
+    /// `source.unexpected("mesh.unit", "only mesh files have a unit; remove it")`.
+    pub fn unexpected(&self, key: &str, why: impl ToString) -> SceneError {
+        let (key, span) = self.place(key);
+        SceneError::unexpected(self, key, span, &why.to_string())
+    }
+
+    /// Returns the error "`key` conflicts with `other`: why", at `key`.
+    ///
+    /// `why` says what to do: `source.conflict("contact.short_range", "contact.stiffness", "keep one of them")`.
+    pub fn conflict(&self, key: &str, other: &str, why: impl ToString) -> SceneError {
+        let (key, span) = self.place(key);
+        SceneError::conflict(self, key, span, other, &why.to_string())
+    }
+
     /// As [`Source::error`], of what already tells what was found and what is allowed: a file that cannot be used.
     pub fn refused(&self, key: &str, error: impl ToString) -> SceneError {
         let (key, span) = self.place(key);

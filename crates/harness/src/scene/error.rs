@@ -148,7 +148,7 @@ impl SceneError {
     pub(super) fn no_version(source: &Source, similar: Option<(String, Range<usize>)>) -> Self {
         let suggestion = similar.as_ref().map(|(name, _)| format!("; did you mean `version` by `{name}`?"));
         let message =
-            format!("`version` is missing; allowed: `version = {VERSION}`{}", suggestion.unwrap_or_default());
+            format!("missing `version`; allowed: `version = {VERSION}`{}", suggestion.unwrap_or_default());
         let span = similar.map_or(0..0, |(_, span)| span);
         let help = Some(format!("begin the file with `version = {VERSION}`"));
         Self::at(source, "scene::version", Some("version".into()), span, message).label("here").help(help)
@@ -168,6 +168,24 @@ impl SceneError {
     pub(super) fn refused(source: &Source, key: String, span: Range<usize>, what: &str) -> Self {
         let message = format!("`{key}`: {what}");
         Self::at(source, "scene::value", Some(key), span, message).label("found here")
+    }
+
+    pub(super) fn missing(source: &Source, key: String, span: Range<usize>, why: &str) -> Self {
+        let name = key.rsplit('.').next().unwrap_or(&key);
+        let label = format!("`{name}` is needed here");
+        let message = format!("missing `{key}`: {why}");
+        Self::at(source, "scene::missing_key", Some(key), span, message).label(label)
+    }
+
+    pub(super) fn unexpected(source: &Source, key: String, span: Range<usize>, why: &str) -> Self {
+        let message = format!("unexpected `{key}`: {why}");
+        Self::at(source, "scene::unexpected_key", Some(key), span, message).label("not allowed here")
+    }
+
+    pub(super) fn conflict(source: &Source, key: String, span: Range<usize>, other: &str, why: &str) -> Self {
+        let label = format!("conflicts with `{other}`");
+        let message = format!("`{key}` conflicts with `{other}`: {why}");
+        Self::at(source, "scene::conflict", Some(key), span, message).label(label)
     }
 
     /// Translates serde's words for the reader of a TOML file.
@@ -210,7 +228,7 @@ impl SceneError {
         if serde.starts_with("missing field") {
             let path = parent.map_or_else(|| name.to_owned(), |path| format!("{path}.{name}"));
             let place = if path == name { 0..0 } else { span };
-            let message = format!("`{path}` is missing");
+            let message = format!("missing `{path}`");
             let label = format!("`{name}` is needed here");
             return Self::at(source, "scene::missing_key", Some(path), place, message).label(label);
         }

@@ -114,7 +114,7 @@ fn every_error_names_place_found_and_allowed() {
             8,
             &["found integer `-3`; allowed: a whole number, not negative"],
         ),
-        ("horizon = 3.015\n", "", "body.horizon", 5, &["`body.horizon` is missing"]),
+        ("horizon = 3.015\n", "", "body.horizon", 5, &["missing `body.horizon`"]),
         ("[body]", "[bodi]", "bodi", 5, &["unknown key `bodi`", "did you mean `body`?"]),
         ("[\"0 mm\", \"2 mm\"]", "[\"0 mm\"]", "load[1].at", 15, &["found", "array"]),
     ] {
@@ -175,7 +175,7 @@ fn unknown_names_show_the_nearest() {
 #[test]
 fn version_comes_first() {
     let missing = fail(&GOOD.replace("version = 1", ""));
-    assert!(missing.message().contains("`version` is missing; allowed: `version = 1`"), "{missing}");
+    assert!(missing.message().contains("missing `version`; allowed: `version = 1`"), "{missing}");
     let other = fail(&GOOD.replace("version = 1", "version = 2").replace("spacing", "anything"));
     assert_eq!(other.message(), "`version`: found 2; allowed: 1");
     assert_eq!(other.line(), Some(2));
@@ -205,6 +205,19 @@ fn cross_field_errors_find_their_value() {
     let error = source.error("body.horizon", 3.015, "at least 5");
     assert_eq!(error.message(), "`body.horizon`: found 3.015; allowed: at least 5");
     assert_eq!(error.exit_code(), 2);
+}
+
+#[test]
+fn keys_are_missing_unexpected_or_in_conflict() {
+    let source = Source::new("scene.toml", GOOD);
+    let missing = source.missing("body.thickness", "a plane body needs it; write a length");
+    assert_eq!(missing.message(), "missing `body.thickness`: a plane body needs it; write a length");
+    assert!(rendered(&missing).contains("`thickness` is needed here"), "{}", rendered(&missing));
+    let unexpected = source.unexpected("load[1].at", "remove it");
+    assert_eq!(unexpected.message(), "unexpected `load[1].at`: remove it");
+    let conflict = source.conflict("body.horizon", "body.spacing", "keep one of them");
+    assert_eq!(conflict.message(), "`body.horizon` conflicts with `body.spacing`: keep one of them");
+    assert_eq!([missing, unexpected, conflict].map(|error| error.line()), [Some(5), Some(15), Some(7)]);
 }
 
 #[test]
