@@ -1,13 +1,13 @@
 //! Scenes of the material alone, and fits, from their text to their report.
 
 use crystfem::kinetics::{Constants, Kinetics, cooling_curve};
-use crystfem::program::run::{Crystfem, Failure};
+use crystfem::program::run::Crystfem;
 use harness::case::Options;
 use harness::report::Report;
-use harness::scene::Source;
+use harness::scene::{Failure, Source};
 use std::path::Path;
 
-fn run_quietly(source: &Source, output: &Path, quick: bool) -> Result<Report, Failure> {
+fn run_quietly(source: &Source, output: &Path, quick: bool) -> Result<Report, Failure<crystfem::Error>> {
     let options = Options { quick, ..Options::new(output) };
     harness::case::run::<Crystfem>(source, options).map(|finished| finished.report)
 }
