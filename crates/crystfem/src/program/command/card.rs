@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::material::{CONSTANT_NAMES, Polymer, Property};
-use crate::program::scene::{SceneKind, Law, MaterialSpec, PartScene, PointScene, kind};
+use crate::program::scene::{Law, MaterialSpec, PartScene, PointScene, SceneKind, kind};
 use harness::scene::{Failure, SceneError, Source};
 use polycore::file::atomic_write;
 use std::fmt::Write as _;
@@ -98,7 +98,7 @@ fn materials(source: &Source) -> Result<Vec<(String, MaterialSpec, String)>, Fai
             Ok(all.into_iter().map(|(name, spec, key)| (name, spec.clone(), key)).collect())
         }
         SceneKind::Fit => {
-             let allowed = "a scene with `[material]` or `[materials]`: \
+            let allowed = "a scene with `[material]` or `[materials]`: \
                            the run writes the fitted constants as a block for it";
             Err(source.error("fit", "a fit scene, which has no material", allowed).into())
         }
@@ -242,7 +242,9 @@ legs = [{ hold = "1 s" }]
 
     #[test]
     fn cards_use_units_of_the_host() {
-        let [(glass, none), (pp, nothing)] = &cards(CardHost::Abaqus, Units::Mm, true)[..] else { panic!("two") };
+        let [(glass, none), (pp, nothing)] = &cards(CardHost::Abaqus, Units::Mm, true)[..] else {
+            panic!("two")
+        };
         assert!(none.is_none() && nothing.is_none());
         let expected = "*CONDUCTIVITY\n1.0, 0.0\n1.2, 100.0\n*SPECIFIC HEAT\n800000000.0\n*DENSITY\n2.5e-9\n";
         assert!(glass.ends_with(expected), "{glass}");
@@ -257,7 +259,7 @@ legs = [{ hold = "1 s" }]
     fn calculix_card_has_six_constants() {
         let all = cards(CardHost::Calculix, Units::Si, false);
         let (deck, Some(file)) = &all[1] else { panic!("a file") };
-         let expected = "CONSTANTS=6\n0.2, 1900.0, 100000.0, 3.0, 0.0, 1.0\n*DENSITY\n905.0\n\
+        let expected = "CONSTANTS=6\n0.2, 1900.0, 100000.0, 3.0, 0.0, 1.0\n*DENSITY\n905.0\n\
                         *SPECIFIC HEAT\n1900.0\n*DEPVAR\n4\n";
         assert!(deck.ends_with(expected), "{deck}");
         assert_eq!(file.lines().filter(|line| line.contains(" = ")).count(), 9);

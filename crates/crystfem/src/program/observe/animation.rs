@@ -1,7 +1,7 @@
 //! Pictures of a part at selected times, and animations: sections through its middle and views from outside.
 
 use super::celsius::{TEMPERATURE, to_celsius};
-use super::part_skin::{SolidFrame, PartSkin};
+use super::part_skin::{PartSkin, SolidFrame};
 use super::section::MeshSection;
 use crate::error::Error;
 use crate::mesh::Mesh;
@@ -17,7 +17,7 @@ pub const FIELDS: &str = "fields.vtkhdf";
 
 /// Largest number of animation frames.
 const MOST_FRAMES: usize = 60;
- /// Time for which each frame is shown, s.
+/// Time for which each frame is shown, s.
 const FRAME_TIME: f64 = 0.12;
 
 /// Frames of a full turn of the turntable.
@@ -132,7 +132,7 @@ fn polycore_error(error: Error) -> polycore::Error {
     }
 }
 
- /// Returns the frames to show: the first after some births, while the new material is hot, then evenly spaced
+/// Returns the frames to show: the first after some births, while the new material is hot, then evenly spaced
 /// ones to the end.
 fn stages(births: &[f64], times: &[f64], wanted: usize) -> Vec<usize> {
     let last = times.len() - 1;
@@ -174,7 +174,7 @@ impl AnimationFrames<'_> {
         }
     }
 
-     /// Reads the temperature and the second field of a frame.
+    /// Reads the temperature and the second field of a frame.
     fn read(&self, frame: usize) -> Result<SolidFrame, Error> {
         let (time, values, exists): (f64, Vec<Vec<f64>>, Vec<bool>) = match &self.from {
             FrameSource::File(series) => {

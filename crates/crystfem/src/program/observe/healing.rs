@@ -1,6 +1,6 @@
 //! Healing of interfaces between layers and beads.
 
-use super::part_skin::{SolidFrame, PartSkin};
+use super::part_skin::{PartSkin, SolidFrame};
 use crate::coupling::{HealingCoupling, HealingSettings};
 use crate::error::Error;
 use crate::program::quantities as q;

@@ -24,8 +24,10 @@ pub type PartObservers<'a> = harness::observe::Observers<'a, Simulation, Error>;
 
 /// Creates the observers that a scene needs, in the order of their fields.
 pub fn observers<'a>(scene: &'a PartScene, task: &'a PartTask) -> PartObservers<'a> {
-    let mut all: Vec<Box<dyn Observer<Simulation, Error> + Send + 'a>> =
-        vec![Box::new(thermal::ThermalObserver::new(task)), Box::new(probes::ProbeObserver::new(scene, task))];
+    let mut all: Vec<Box<dyn Observer<Simulation, Error> + Send + 'a>> = vec![
+        Box::new(thermal::ThermalObserver::new(task)),
+        Box::new(probes::ProbeObserver::new(scene, task)),
+    ];
     all.push(Box::new(lines::LineObserver { scene, task }));
     all.push(Box::new(animation::AnimationObserver { scene, task }));
     if let Some(mechanics) = &task.mechanics {

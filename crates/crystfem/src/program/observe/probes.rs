@@ -4,7 +4,7 @@ use super::celsius::CELSIUS;
 use crate::error::Error;
 use crate::mesh::Place;
 use crate::program::quantities as q;
-use crate::program::scene::{PartScene, ProbeSpec, PartTask};
+use crate::program::scene::{PartScene, PartTask, ProbeSpec};
 use crate::simulation::Simulation;
 use harness::observe::{Observer, Outputs, Scalars};
 use harness::output::csv;
@@ -70,7 +70,11 @@ impl ProbeRecord {
 ///
 /// # Errors
 /// Returns [`Error::NotFinite`] for a non-finite value.
-pub fn record(probes: &mut [ProbeRecord], simulation: &Simulation, names: &[&'static str]) -> Result<(), Error> {
+pub fn record(
+    probes: &mut [ProbeRecord],
+    simulation: &Simulation,
+    names: &[&'static str],
+) -> Result<(), Error> {
     if !probes.iter().any(|probe| probe.exists(simulation)) {
         return Ok(());
     }
@@ -201,7 +205,12 @@ impl Observer<Simulation, Error> for ProbeObserver<'_> {
 }
 
 /// Draws temperatures and fields of all probes over time.
-fn draw(probes: &[ProbeRecord], names: &[&'static str], scene: &PartScene, output: &Path) -> Result<(), Error> {
+fn draw(
+    probes: &[ProbeRecord],
+    names: &[&'static str],
+    scene: &PartScene,
+    output: &Path,
+) -> Result<(), Error> {
     let quantities =
         std::iter::once(("temperature", "T [°C]")).chain(names.iter().map(|name| (*name, *name)));
     for (index, (name, label)) in quantities.enumerate() {

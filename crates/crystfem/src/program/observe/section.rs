@@ -105,7 +105,7 @@ mod tests {
         assert!(MeshSection::through_the_middle(&mesh, &[]).is_none());
     }
 
-     /// A tetrahedron fills the triangle of its section, not its bounding box; a brick of tetrahedra fills the whole
+    /// A tetrahedron fills the triangle of its section, not its bounding box; a brick of tetrahedra fills the whole
     /// section.
     #[test]
     fn tetrahedra_are_cut() {

@@ -87,8 +87,10 @@ impl<'a> Observer<Simulation, Error> for StressObserver<'a> {
     }
 
     fn draw(&self, _: &Simulation, to: &Outputs) -> Result<(), Error> {
-        let drawn =
-            self.coupling.as_ref().map(|stress| warpage_picture::draw(self.scene, self.task, stress, to.folder));
+        let drawn = self
+            .coupling
+            .as_ref()
+            .map(|stress| warpage_picture::draw(self.scene, self.task, stress, to.folder));
         drawn.unwrap_or(Ok(()))
     }
 

@@ -1,6 +1,6 @@
 //! Picture of the warped part.
 
-use super::part_skin::{SolidFrame, PartSkin};
+use super::part_skin::{PartSkin, SolidFrame};
 use crate::coupling::StressCoupling;
 use crate::error::Error;
 use crate::program::scene::{PartScene, PartTask};
@@ -21,7 +21,10 @@ pub fn draw(scene: &PartScene, task: &PartTask, stress: &StressCoupling, output:
     let moved = stress.displacement();
     let most = moved.chunks(3).map(|u| u[0].hypot(u[1]).hypot(u[2])).filter(|u| u.is_finite());
     let size = (0..3).map(|d| bounds[1][d] - bounds[0][d]).fold(0.0, f64::max);
-    let factor = scene.output.magnify.unwrap_or_else(|| round_down(DRAWN_DISPLACEMENT * size / most.fold(0.0, f64::max)));
+    let factor = scene
+        .output
+        .magnify
+        .unwrap_or_else(|| round_down(DRAWN_DISPLACEMENT * size / most.fold(0.0, f64::max)));
     let shown = |node: usize, d: usize| {
         let u = moved[3 * node + d];
         mesh.points[node][d] + if u.is_finite() { factor * u } else { 0.0 }

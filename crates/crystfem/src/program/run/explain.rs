@@ -11,7 +11,10 @@ use harness::scene::{Failure, Source};
 ///
 /// # Errors
 /// Returns an error for an invalid scene.
-pub fn explain_scene(source: &Source, scene: &PartScene) -> Result<(Vec<String>, Vec<Named>), Failure<Error>> {
+pub fn explain_scene(
+    source: &Source,
+    scene: &PartScene,
+) -> Result<(Vec<String>, Vec<Named>), Failure<Error>> {
     let built = scene.mesh.build(source)?;
     let (points, elements) = (built.mesh.points.len(), built.mesh.element_count());
     let [low, high] = built.mesh.bounds().unwrap_or_default().map(millimetres);

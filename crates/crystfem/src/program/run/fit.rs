@@ -30,10 +30,12 @@ impl FinishedFit {
     /// Returns the fitted kinetics as a key of a material block.
     fn block(&self) -> Option<String> {
         let Known { equilibrium_melting, frozen, activation_energy } = self.known?;
-        let estimate = |name: &str| self.fit.estimates.iter().find(|estimate| estimate.name == name).map(|estimate| estimate.value);
+        let estimate = |name: &str| {
+            self.fit.estimates.iter().find(|estimate| estimate.name == name).map(|estimate| estimate.value)
+        };
         let [rate, nucleation, n] = ["growth_rate", "nucleation", "avrami_exponent"].map(estimate);
         Some(format!(
-             "kinetics = {{ growth_rate = \"{:.6e} 1/s\", nucleation = \"{:.6e} K^2\", \
+            "kinetics = {{ growth_rate = \"{:.6e} 1/s\", nucleation = \"{:.6e} K^2\", \
                          activation_energy = \"{activation_energy} J/mol\", equilibrium_melting = \"{equilibrium_melting} K\", \
                          frozen = \"{frozen} K\", avrami_exponent = {:.5} }}\n",
             rate?, nucleation?, n?
@@ -42,7 +44,11 @@ impl FinishedFit {
 }
 
 /// Runs every fit.
-pub fn run(source: &Source, scene: &FitScene, run: &mut harness::case::Run) -> Result<Finished, Failure<Error>> {
+pub fn run(
+    source: &Source,
+    scene: &FitScene,
+    run: &mut harness::case::Run,
+) -> Result<Finished, Failure<Error>> {
     let (output, quick) = (run.options.output, run.options.quick);
     let jobs = scene.jobs(source)?;
     run.begin()?;

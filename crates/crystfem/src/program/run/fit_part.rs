@@ -4,10 +4,10 @@ use crate::error::Error;
 use crate::fit::{self, Fit};
 use crate::kinetics::Constants;
 use crate::program::observe::celsius::CELSIUS;
-use harness::scene::Failure;
 use crate::program::observe::{ProbeRecord, record};
 use crate::program::scene::PartFit;
 use crate::simulation::Simulation;
+use harness::scene::Failure;
 use std::cell::RefCell;
 
 /// Fits the constants. `show` is called before each trial; its error ends the fit.
@@ -45,8 +45,12 @@ fn trial(job: &PartFit, constants: &Constants) -> Result<Vec<[f64; 2]>, Failure<
     let names = simulation.field_names();
     let fields = names.len();
     let field = names.iter().position(|name| *name == "alpha").unwrap_or(0);
-    let mut probes: Vec<ProbeRecord> =
-        scene.probe.iter().zip(&task.probes).map(|(spec, place)| ProbeRecord::new(spec, place, fields)).collect();
+    let mut probes: Vec<ProbeRecord> = scene
+        .probe
+        .iter()
+        .zip(&task.probes)
+        .map(|(spec, place)| ProbeRecord::new(spec, place, fields))
+        .collect();
     record(&mut probes, &simulation, &names)?;
     simulation.observe(task.end, |simulation| record(&mut probes, simulation, &names))?;
     let mut rows = Vec::new();

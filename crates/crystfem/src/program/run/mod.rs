@@ -15,10 +15,9 @@ pub use program::Crystfem;
 
 use crate::error::Error;
 use crate::program::quantities;
-use crate::program::scene::{self, FitScene, SceneKind, PartScene, PointScene};
+use crate::program::scene::{self, FitScene, PartScene, PointScene, SceneKind};
 use harness::case::{Finished, Run, check_expectations};
 use harness::scene::{Failure, SceneError, Source};
-
 
 /// Runs a scene of any kind; [`Run::finish`] writes `report.json`.
 ///

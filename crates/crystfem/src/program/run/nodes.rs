@@ -48,7 +48,7 @@ fn kelvin(spec: &AnalysisNodesSpec, path: &Path, frame: &thermal::ThermalFrame) 
     };
     let time = frame.time;
     let reason =
-         format!("found {wrong} K at t = {time} s; allowed: above 0 K (check `unit`, the unit of the file)");
+        format!("found {wrong} K at t = {time} s; allowed: above 0 K (check `unit`, the unit of the file)");
     Err(Error::Data { what: path.display().to_string(), reason })
 }
 
@@ -83,7 +83,10 @@ pub fn run(
         }
         let duration = frame.time - time;
         if duration.is_nan() || duration < 0.0 {
-            return Err(data(format!("found t = {} s after {time} s; allowed: increasing times", frame.time)));
+            return Err(data(format!(
+                "found t = {} s after {time} s; allowed: increasing times",
+                frame.time
+            )));
         }
         nodes
             .par_iter_mut()
@@ -106,16 +109,19 @@ pub fn run(
     }
     series.finish()?;
     report.work(&format!("{name}.frames"), frames).work(&format!("{name}.nodes"), nodes.len() as u64);
-    let mut span =
-        |least: Quantity, mean: Quantity, largest: Quantity, value: &dyn Fn(&AnalysisNode) -> f64, keys: &[&str]| {
-            let values: Vec<f64> = nodes.iter().map(value).filter(|value| value.is_finite()).collect();
-            if values.len() == nodes.len() {
-                let fold = |pick: fn(f64, f64) -> f64, first| values.iter().copied().fold(first, pick);
-                report.value(least.of(keys), fold(f64::min, f64::INFINITY));
-                report.value(mean.of(keys), values.iter().sum::<f64>() / values.len() as f64);
-                report.value(largest.of(keys), fold(f64::max, f64::NEG_INFINITY));
-            }
-        };
+    let mut span = |least: Quantity,
+                    mean: Quantity,
+                    largest: Quantity,
+                    value: &dyn Fn(&AnalysisNode) -> f64,
+                    keys: &[&str]| {
+        let values: Vec<f64> = nodes.iter().map(value).filter(|value| value.is_finite()).collect();
+        if values.len() == nodes.len() {
+            let fold = |pick: fn(f64, f64) -> f64, first| values.iter().copied().fold(first, pick);
+            report.value(least.of(keys), fold(f64::min, f64::INFINITY));
+            report.value(mean.of(keys), values.iter().sum::<f64>() / values.len() as f64);
+            report.value(largest.of(keys), fold(f64::max, f64::NEG_INFINITY));
+        }
+    };
     for (field, quantity) in material.field_names().iter().enumerate() {
         span(q::NODES_LEAST, q::NODES_MEAN, q::NODES_LARGEST, &|node| node.fields[field], &[name, quantity]);
     }

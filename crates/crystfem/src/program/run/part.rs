@@ -32,7 +32,12 @@ pub fn run(source: &Source, scene: &PartScene, run: &mut Run) -> Result<Finished
 }
 
 /// Runs one scene, or one study of a scene; expectations are judged after all studies.
-pub fn run_scene(source: &Source, scene: &PartScene, is_study: bool, run: &mut Run) -> Result<Report, Failure<Error>> {
+pub fn run_scene(
+    source: &Source,
+    scene: &PartScene,
+    is_study: bool,
+    run: &mut Run,
+) -> Result<Report, Failure<Error>> {
     let (output, quick) = (run.options.output, run.options.quick);
     let mut phases = Phases::new();
     phases.start("mesh");
@@ -87,7 +92,7 @@ pub fn warnings(report: &Report) -> String {
         let Value::Scalar { value, .. } = value else { continue };
         if *value > 1.0 && name.rsplit('.').next() == Some(q::MISES_OVER_STRENGTH.name) {
             lines += &format!(
-                 "warning: {name} = {value:.3}: the largest Mises stress exceeds the strength; yielding and fracture \
+                "warning: {name} = {value:.3}: the largest Mises stress exceeds the strength; yielding and fracture \
                                  are not modelled\n"
             );
         }

@@ -16,7 +16,11 @@ use std::path::Path;
 const DEGREES: [f64; 3] = [0.01, 0.5, 0.99];
 
 /// Runs each point with each of its materials.
-pub fn run(source: &Source, scene: &PointScene, run: &mut harness::case::Run) -> Result<Report, Failure<Error>> {
+pub fn run(
+    source: &Source,
+    scene: &PointScene,
+    run: &mut harness::case::Run,
+) -> Result<Report, Failure<Error>> {
     let (output, quick) = (run.options.output, run.options.quick);
     let materials = scene.materials(source)?;
     let mut built = Vec::new();
@@ -61,7 +65,8 @@ pub fn run(source: &Source, scene: &PointScene, run: &mut harness::case::Run) ->
     }
     for nodes in scene.nodes.iter().filter(|nodes| !quick || nodes.quick) {
         phases.start("integrate");
-        let matches = |(name, ..): &&(&str, _, _)| nodes.material.as_deref().is_none_or(|given| given == *name);
+        let matches =
+            |(name, ..): &&(&str, _, _)| nodes.material.as_deref().is_none_or(|given| given == *name);
         if let Some((.., material)) = built.iter().find(matches) {
             let path = source.file(&nodes.file);
             super::nodes::run(nodes, &nodes.name, &path, &**material, output, &mut report)?;

@@ -34,8 +34,8 @@ pub fn run(source: &Source, scene: &PartScene, run: &mut Run) -> Result<Finished
         }
         check_expectations(source, scene, &studies, names)?;
         run.begin()?;
-         // results of an earlier run must not pass for this one
-                for study in &studies {
+        // results of an earlier run must not pass for this one
+        for study in &studies {
             drop(harness::case::prepare_run(output.join(&study.name))?);
         }
     }
@@ -215,7 +215,8 @@ pub fn explain(source: &Source, scene: &PartScene, quick: bool) -> Result<Vec<St
             lines.push(format!("  expects    an error that contains `{error}`"));
             continue;
         }
-        let (own, quantities) = super::explain::explain_scene(&study.source, &PartScene::from_variant(study)?)?;
+        let (own, quantities) =
+            super::explain::explain_scene(&study.source, &PartScene::from_variant(study)?)?;
         names.extend(prefix_names(&study.name, quantities));
         lines.extend(own.iter().map(|line| format!("  {line}")));
     }

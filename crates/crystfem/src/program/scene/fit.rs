@@ -1,8 +1,8 @@
 //! Scene of fits.
 
-use super::locate_error::located_in;
 use super::fit_part::PartFit;
 use super::fit_spec::{FitLaw, FitSpec, alpha, table, temperature, time};
+use super::locate_error::located_in;
 use super::material::KINETICS_KEYS;
 use super::{PictureOutput, Program, check_name};
 use crate::fit::{Cooling, Known, MeasuredPeak, Run};
@@ -58,7 +58,7 @@ impl FitScene {
             if self.fit[..index].iter().any(|other| other.name == fit.name) {
                 return Err(source.error(
                     &key("name"),
-                     format!("`{}` twice", fit.name),
+                    format!("`{}` twice", fit.name),
                     "a different name for each fit",
                 ));
             }
@@ -99,7 +99,7 @@ impl FitSpec {
         for (name, given, law) in foreign {
             if given && law != self.law {
                 let law = format!("{law:?}").to_lowercase();
-                 let why = format!("it belongs to `law = \"{law}\"`; remove it or change the law");
+                let why = format!("it belongs to `law = \"{law}\"`; remove it or change the law");
                 return Err(source.unexpected(&key(name), why));
             }
         }
@@ -109,28 +109,30 @@ impl FitSpec {
             return Err(source.error(&key("data"), format!("{rows} files"), format!("at least {needed}")));
         }
         if self.law == FitLaw::Avrami && rows > 1 {
-            return Err(source.error(
-                &key("data[1]"),
-                "2 files",
-                "1 file (use one [[fit]] per temperature)",
-            ));
+            return Err(source.error(&key("data[1]"), "2 files", "1 file (use one [[fit]] per temperature)"));
         }
         if self.law == Part && self.heat_flow.is_some() {
-             let why = "fits of a part use α, not heat flow; remove it";
-                        return Err(source.unexpected(&key("heat_flow"), why));
+            let why = "fits of a part use α, not heat flow; remove it";
+            return Err(source.unexpected(&key("heat_flow"), why));
         }
         for (i, data) in self.data.iter().enumerate() {
             if self.law != Part && data.probe.is_some() {
                 let at = key(&format!("data[{i}].probe"));
-                return Err(source.unexpected(&at, "it belongs to `law = \"part\"`; remove it or change the law"));
+                return Err(
+                    source.unexpected(&at, "it belongs to `law = \"part\"`; remove it or change the law")
+                );
             }
             let at = key(&format!("data[{i}].rate"));
             match (self.law, data.rate.map(|rate| rate.si())) {
-                (Part, Some(_)) => return Err(source.unexpected(&at, "the part determines the cooling; remove it")),
-                (FitLaw::Avrami, Some(_)) => {
-                     return Err(source.unexpected(&at, "Avrami's law fits isothermal runs; remove it"));
+                (Part, Some(_)) => {
+                    return Err(source.unexpected(&at, "the part determines the cooling; remove it"));
                 }
-                (Ozawa, None) => return Err(source.missing(&at, "Ozawa's law needs the cooling rate of each run")),
+                (FitLaw::Avrami, Some(_)) => {
+                    return Err(source.unexpected(&at, "Avrami's law fits isothermal runs; remove it"));
+                }
+                (Ozawa, None) => {
+                    return Err(source.missing(&at, "Ozawa's law needs the cooling rate of each run"));
+                }
                 (_, Some(rate)) if !(rate > 0.0 && rate.is_finite()) => {
                     return Err(source.error(&at, format!("{rate} K/s"), "a cooling rate above 0"));
                 }
@@ -159,7 +161,7 @@ impl FitSpec {
             }
             FitLaw::Ozawa => {
                 if self.temperatures.is_empty() {
-                     let why = "Ozawa's law needs at least one temperature at which it compares the rates";
+                    let why = "Ozawa's law needs at least one temperature at which it compares the rates";
                     return Err(source.missing(&key("temperatures"), why));
                 }
                 let mut coolings = Vec::new();
@@ -203,18 +205,18 @@ impl FitSpec {
 
     fn known(&self, source: &Source, key: &dyn Fn(&str) -> String) -> Result<Known, SceneError> {
         let Some(melting) = self.equilibrium_melting else {
-             let why = "Nakamura's law needs the temperature T₀, e.g. from a Hoffman–Weeks plot";
+            let why = "Nakamura's law needs the temperature T₀, e.g. from a Hoffman–Weeks plot";
             return Err(source.missing(&key("equilibrium_melting"), why));
         };
         let frozen = match (self.frozen, self.glass_transition) {
             (Some(frozen), None) => frozen.si(),
             (None, Some(glass)) => glass.si() - 30.0,
             (None, None) => {
-                 let why = "Nakamura's law needs `frozen`, or `glass_transition` for T∞ = T_g − 30 K";
+                let why = "Nakamura's law needs `frozen`, or `glass_transition` for T∞ = T_g − 30 K";
                 return Err(source.missing(&key("frozen"), why));
             }
             (Some(_), Some(_)) => {
-                 return Err(source.conflict(&key("glass_transition"), &key("frozen"), "keep one of them"));
+                return Err(source.conflict(&key("glass_transition"), &key("frozen"), "keep one of them"));
             }
         };
         let example = Constants::TABLE_4_1_COLUMN_1;

@@ -2,7 +2,7 @@
 
 use super::fit_spec::{FitSpec, alpha, table, time};
 use super::material::KineticsSpec;
-use super::{SceneKind, PartScene};
+use super::{PartScene, SceneKind};
 use crate::kinetics::Constants;
 use harness::scene::{SceneError, Source};
 
@@ -35,14 +35,18 @@ impl PartFit {
 }
 
 impl FitSpec {
-    pub(super) fn read_part(&self, source: &Source, key: &dyn Fn(&str) -> String) -> Result<PartFit, SceneError> {
+    pub(super) fn read_part(
+        &self,
+        source: &Source,
+        key: &dyn Fn(&str) -> String,
+    ) -> Result<PartFit, SceneError> {
         let Some(file) = &self.part else {
             return Err(source.missing(&key("part"), "`law = \"part\"` needs the scene of a part"));
         };
         let part = Source::read(source.file(file))
             .map_err(|error| source.error(&key("part"), error.message(), "the scene of a part"))?;
         if super::kind(&part)? != SceneKind::Part {
-             let found = format!("`{}`, a scene without [mesh]", file.display());
+            let found = format!("`{}`, a scene without [mesh]", file.display());
             return Err(source.error(&key("part"), found, "the scene of a part"));
         }
         let scene: PartScene = part.parse()?;
@@ -58,7 +62,7 @@ impl FitSpec {
             (Some(name), _) => return Err(source.unknown(&key("material"), name, &known)),
             (None, [only]) => only,
             (None, _) => {
-                 let why = format!("{} materials of the part crystallize; name one", known.len());
+                let why = format!("{} materials of the part crystallize; name one", known.len());
                 return Err(source.missing(&key("material"), why));
             }
         };

@@ -23,10 +23,10 @@ pub(super) fn filament(
     if let (Some(own), Some(stated), true) = (given, path.filament, path.volumetric)
         && (own / stated - 1.0).abs() > DIAMETER_TOLERANCE
     {
-         let allowed = format!(
-                    "{} mm, or no `filament`: E in the file is a volume (M200) of this diameter",
-                    1e3 * stated
-                );
+        let allowed = format!(
+            "{} mm, or no `filament`: E in the file is a volume (M200) of this diameter",
+            1e3 * stated
+        );
         return Err(source.error(&format!("{block}.filament"), format!("{} mm", 1e3 * own), allowed));
     }
     Ok(given.or(path.filament).unwrap_or(FILAMENT))
@@ -43,33 +43,31 @@ pub(super) fn with_times(
     notes: &mut Vec<String>,
 ) -> Result<ToolPath, SceneError> {
     let (path, with) = match (acceleration, jerk) {
-        (None, None) => {
-            match path.describe_limits() {
-                Some(limits) => {
-                    notes.push(format!(
-                        "path times follow the limits in the file: {limits}; waits for temperatures are ignored"
-                    ));
-                    (path.as_stated(), "with the limits in the file")
-                }
-                None => {
-                     notes.push(
+        (None, None) => match path.describe_limits() {
+            Some(limits) => {
+                notes.push(format!(
+                    "path times follow the limits in the file: {limits}; waits for temperatures are ignored"
+                ));
+                (path.as_stated(), "with the limits in the file")
+            }
+            None => {
+                notes.push(
                                         "path times follow F: the file has no acceleration limits; waits for temperatures are ignored"
                                             .into(),
                                     );
-                    (path, "at F")
-                }
+                (path, "at F")
             }
-        }
+        },
         (Some(acceleration), Some(jerk)) => {
             let path = path.accelerated(acceleration.si(), jerk.si());
             (path.map_err(|error| located_in(source, block, &KEYS, &error))?, "with the limits of the scene")
         }
         (given, _) => {
             let missing = if given.is_some() { "jerk" } else { "acceleration" };
-             return Err(source.missing(
-                            &format!("{block}.{missing}"),
-                            "`acceleration` and `jerk` need each other; write both or neither",
-                        ));
+            return Err(source.missing(
+                &format!("{block}.{missing}"),
+                "`acceleration` and `jerk` need each other; write both or neither",
+            ));
         }
     };
     notes.extend(path.compared(with));
@@ -84,11 +82,11 @@ pub(super) fn without_loose_beads(
     notes: &mut Vec<String>,
 ) -> Result<ToolPath, SceneError> {
     if let Some((count, line, share)) = path.without_loose() {
-         let text = format!(
-                    "{count} printing moves lie at or below the bed (z ≤ 0) or have no support, the first in line {line}: \
+        let text = format!(
+            "{count} printing moves lie at or below the bed (z ≤ 0) or have no support, the first in line {line}: \
                      {:.2} % of the filament",
-                    100.0 * share
-                );
+            100.0 * share
+        );
         if share > MOST_LOOSE {
             return Err(source.error(key, text, "beads above the bed (z = 0)"));
         }

@@ -71,7 +71,10 @@ impl<D: Dimension + Copy> TimesSpec<D> {
 
     /// Returns the temperature towards which a bed cools, K, and the time constant, s.
     fn cooling(&self) -> (f64, f64) {
-        (self.cools_to.map_or(ROOM_TEMPERATURE, |room| room.si()), self.cooling_time.map_or(COOLING_TIME, |time| time.si()))
+        (
+            self.cools_to.map_or(ROOM_TEMPERATURE, |room| room.si()),
+            self.cooling_time.map_or(COOLING_TIME, |time| time.si()),
+        )
     }
 
     /// Returns a setting of a G-code file over time. Each command acts within a second, but a bed that is
@@ -87,7 +90,11 @@ impl<D: Dimension + Copy> TimesSpec<D> {
         let fault =
             |name: &str, found: &str, allowed: &str| source.error(&format!("{key}.{name}"), found, allowed);
         if self.file.is_some() && (table || self.period.is_some()) {
-            return Err(source.conflict(&format!("{key}.of"), "time, value, period", "keep `file` and `of`, or the others"));
+            return Err(source.conflict(
+                &format!("{key}.of"),
+                "time, value, period",
+                "keep `file` and `of`, or the others",
+            ));
         }
         let path = self.path(source, key)?;
         let setting = match of {
@@ -104,15 +111,27 @@ impl<D: Dimension + Copy> TimesSpec<D> {
                 pairs.insert(0, (f64::NEG_INFINITY, low.si()));
             }
             (Setting::Fan, ..) => {
-                 return Err(source.missing(&format!("{key}.low"), "a fan needs `low` and `high`: the values with the fan off and on"));
+                return Err(source.missing(
+                    &format!("{key}.low"),
+                    "a fan needs `low` and `high`: the values with the fan off and on",
+                ));
             }
             (_, None, None) if D::NAME == TemperatureDimension::NAME => {}
-            (_, None, None) => return Err(fault("of", "a temperature setting", "`fan` with `low` and `high`")),
-             _ => return Err(source.unexpected(&format!("{key}.low"), "temperatures of a file need no scale; remove `low` and `high`")),
+            (_, None, None) => {
+                return Err(fault("of", "a temperature setting", "`fan` with `low` and `high`"));
+            }
+            _ => {
+                return Err(source.unexpected(
+                    &format!("{key}.low"),
+                    "temperatures of a file need no scale; remove `low` and `high`",
+                ));
+            }
         }
         let cooling = [("cools_to", self.cools_to.is_some()), ("cooling_time", self.cooling_time.is_some())];
         if let Some((name, _)) = cooling.iter().find(|(_, given)| *given && setting != Setting::Bed) {
-             return Err(source.unexpected(&format!("{key}.{name}"), "it belongs to `of = \"bed\"`; remove it"));
+            return Err(
+                source.unexpected(&format!("{key}.{name}"), "it belongs to `of = \"bed\"`; remove it")
+            );
         }
         let (room, constant) = self.cooling();
         if !(constant > 0.0 && constant.is_finite()) {
@@ -158,7 +177,10 @@ fn bed(pairs: &[(f64, f64)], room: f64, constant: f64) -> Vec<(f64, f64)> {
         // time at which it reaches its setting; never below room temperature
         let reached = if set > room { constant * ((now - room) / (set - room)).ln() } else { f64::INFINITY };
         let end = reached.min(next - from);
-        let inside = COOLING_SAMPLES.iter().map(|share| share * constant).filter(|after| *after < end - 1e-6 * CHANGE_TIME);
+        let inside = COOLING_SAMPLES
+            .iter()
+            .map(|share| share * constant)
+            .filter(|after| *after < end - 1e-6 * CHANGE_TIME);
         points.extend(inside.map(|after| (from + after, at(after))));
         if end.is_finite() && end > 2e-6 * CHANGE_TIME {
             points.push((from + end, if reached <= next - from { set } else { at(end) }));

@@ -1,7 +1,7 @@
 //! Raw heat flow of a calorimeter as data of a fit.
 
-use super::locate_error::located;
 use super::fit_spec::{DataSpec, Direction, FitLaw, FitSpec, HeatFlowSpec, Limit, temperature, time};
+use super::locate_error::located;
 use crate::error::Error;
 use crate::fit::{MeasuredPeak, Thermogram};
 use crate::table::{Column, read_with_lines};
@@ -29,7 +29,7 @@ impl FitSpec {
         };
         for (i, data) in self.data.iter().enumerate() {
             if let (None, Some(name)) = (&self.heat_flow, foreign(data)) {
-                 let why = "it belongs to raw heat flow; remove it or add `heat_flow` to the fit";
+                let why = "it belongs to raw heat flow; remove it or add `heat_flow` to the fit";
                 return Err(source.unexpected(&key(&format!("data[{i}].{name}")), why));
             }
             if let Some(mass) = data.mass.map(|mass| mass.si()).filter(|mass| *mass <= 0.0) {
@@ -85,10 +85,8 @@ impl FitSpec {
         table.measured.peak([from, to], flow.baseline, melting).map_err(|error| match &error {
             Error::Parameter { allowed, found, .. } => {
                 let direction = format!("{:?}", flow.exothermal).to_lowercase();
-                 let found = format!(
-                                    "`{direction}`, which gives {} the area {found:.4e} J/kg",
-                                    data.file.display()
-                                );
+                let found =
+                    format!("`{direction}`, which gives {} the area {found:.4e} J/kg", data.file.display());
                 source.error(&key("heat_flow.exothermal"), found, allowed)
             }
             _ => located(source, &at_key("file"), &error),
@@ -110,7 +108,10 @@ impl FitSpec {
             };
             if self.law == FitLaw::Avrami {
                 let ([times, flows], lines) = read_with_lines(path, [time(), heat_flow])?;
-                return Ok(FlowTable { measured: Thermogram { times, temperatures: Vec::new(), flows }, lines });
+                return Ok(FlowTable {
+                    measured: Thermogram { times, temperatures: Vec::new(), flows },
+                    lines,
+                });
             }
             let columns = [time(), temperature(), heat_flow];
             let ([times, temperatures, flows], lines) = read_with_lines(path, columns)?;
@@ -124,17 +125,17 @@ impl FitSpec {
         Err(match (read(data.mass.is_some()), data.mass) {
             (Err(_), _) => located(source, &key("file"), &error),
             (Ok(_), None) => {
-                 let why = format!(
-                                    "the heat flow of {} is a power; write the mass of the sample, e.g. \"5.2 mg\", or a column in W/g",
-                                    data.file.display()
-                                );
+                let why = format!(
+                    "the heat flow of {} is a power; write the mass of the sample, e.g. \"5.2 mg\", or a column in W/g",
+                    data.file.display()
+                );
                 source.missing(&key("mass"), why)
             }
             (Ok(_), Some(_)) => {
-                 let why = format!(
-                                    "the heat flow of {} is already per mass; remove it, or write a column in mW",
-                                    data.file.display()
-                                );
+                let why = format!(
+                    "the heat flow of {} is already per mass; remove it, or write a column in mW",
+                    data.file.display()
+                );
                 source.unexpected(&key("mass"), why)
             }
         })

@@ -1,8 +1,8 @@
 //! Material block of a scene.
 
-use super::text_or_table::{self, TextOrTable};
 use super::locate_error::{located, located_in};
 use super::powder::PowderSpec;
+use super::text_or_table::{self, TextOrTable};
 use crate::error::Error;
 use crate::kinetics::{Constants, Kinetics};
 use crate::material::{AsPublished, Conductor, Polymer, Property, Semicrystalline, Sign, ThermalMaterial};
@@ -36,9 +36,9 @@ pub enum Law {
 /// conductivity = "0.25 W/(m K)"
 /// specific_heat = { temperature = ["20 degC", "200 degC"], value = ["1500 J/(kg K)", "2600 J/(kg K)"] }
 /// kinetics = "table-4.1-column-1"
- /// melting = "pa12"          # default: crystals never melt
+/// melting = "pa12"          # default: crystals never melt
 /// crystallinity = 0.25
- /// latent_heat = "209 J/g"   # default: crystallinity does not affect the temperature
+/// latent_heat = "209 J/g"   # default: crystallinity does not affect the temperature
 /// ```
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -207,23 +207,23 @@ impl MaterialSpec {
             let at = format!("{key}.{name}");
             match self.law {
                 Law::Semicrystalline if needed && !given => {
-                     return Err(source.missing(&at, "a semicrystalline material needs it"));
+                    return Err(source.missing(&at, "a semicrystalline material needs it"));
                 }
                 Law::Conductor | Law::AsPublished if given => {
-                     let why = "it belongs to `law = \"semicrystalline\"`; remove it or change the law";
+                    let why = "it belongs to `law = \"semicrystalline\"`; remove it or change the law";
                     return Err(source.unexpected(&at, why));
                 }
                 _ => {}
             }
         }
         if self.powder.is_some() && self.law == Law::AsPublished {
-             let why = "the published subroutine has no powder; remove it";
+            let why = "the published subroutine has no powder; remove it";
             return Err(source.unexpected(&format!("{key}.powder"), why));
         }
         for (name, given) in [("sign", self.sign.is_some()), ("guarded", self.guarded.is_some())] {
             if given && self.law != Law::AsPublished {
-                 let why = "it belongs to `law = \"as-published\"`; remove it or change the law";
-                 return Err(source.unexpected(&format!("{key}.{name}"), why));
+                let why = "it belongs to `law = \"as-published\"`; remove it or change the law";
+                return Err(source.unexpected(&format!("{key}.{name}"), why));
             }
         }
         Ok(())
@@ -318,12 +318,12 @@ impl GivenKinetics {
             (None, Some(glass)) => glass.si() - 30.0,
             (None, None) => {
                 let at = format!("{key}.kinetics.frozen");
-                 return Err(source.missing(&at, "write `frozen`, or `glass_transition` for T∞ = T_g − 30 K"));
+                return Err(source.missing(&at, "write `frozen`, or `glass_transition` for T∞ = T_g − 30 K"));
             }
             (Some(_), Some(_)) => {
                 let at = format!("{key}.kinetics.glass_transition");
-                 let frozen = format!("{key}.kinetics.frozen");
-                                return Err(source.conflict(&at, &frozen, "keep one of them"));
+                let frozen = format!("{key}.kinetics.frozen");
+                return Err(source.conflict(&at, &frozen, "keep one of them"));
             }
         };
         let energy = Constants::TABLE_4_1_COLUMN_1.activation_energy;

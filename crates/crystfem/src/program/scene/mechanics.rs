@@ -33,7 +33,6 @@ pub struct MechanicsSpec {
     pub strain_step: Option<f64>,
 }
 
-
 /// Mechanical constants.
 #[derive(Clone, Debug, PartialEq, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -132,7 +131,7 @@ impl PartScene {
         let others = all().filter(|nodes| !is_known(nodes.len())).count();
         if others > 0 {
             let found = format!("a mesh with {others} wedges or second-order hexahedra");
-             let allowed = "8-node hexahedra, 4- or 10-node tetrahedra (meshers produce tetrahedra for any shape; \
+            let allowed = "8-node hexahedra, 4- or 10-node tetrahedra (meshers produce tetrahedra for any shape; \
                                        so does `cells` of a bar or brick)";
             return Err(source.error("mechanics", found, allowed));
         }
@@ -167,9 +166,9 @@ impl PartScene {
             all().map(|nodes| (nodes.len(), key(&places(nodes)))).collect();
         let counts = [bears.iter().filter(|bears| **bears).count(), shapes.len()];
         // K̂ and gradients
-        let matrices = shapes
-            .iter()
-            .map(|(nodes, _)| if *nodes == 8 { HEXAHEDRON_BYTES } else { TETRAHEDRON_BYTES[usize::from(*nodes > 4)] });
+        let matrices = shapes.iter().map(|(nodes, _)| {
+            if *nodes == 8 { HEXAHEDRON_BYTES } else { TETRAHEDRON_BYTES[usize::from(*nodes > 4)] }
+        });
         let matrices = matrices.sum();
         let stiff = all().zip(bears).all(|(nodes, bears)| nodes.len() == 4 || !bears);
         let settings = StressSettings {

@@ -45,7 +45,7 @@ const FACTOR: f64 = 16.0;
 const WRITTEN_NODE: f64 = 100.0;
 const WRITTEN_ELEMENT: f64 = 80.0;
 const FIELD: f64 = 64.0;
- /// Point of a line: element nodes and weights, neighbouring elements, position; value of a table.
+/// Point of a line: element nodes and weights, neighbouring elements, position; value of a table.
 const LINE_POINT: f64 = 24.0 + 2.0 * 56.0 + 8.0 * 16.0 + 32.0 + 24.0;
 const CELL: f64 = 8.0;
 /// Largest number of fixed steps, and of output times.

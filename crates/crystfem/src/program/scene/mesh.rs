@@ -153,11 +153,11 @@ impl MeshSpec {
         let kinds = structured.into_iter().chain(from_files);
         let given = kinds.filter(|&x| x).count();
         if given != 1 {
-             let one = "one of `bar`, `brick`, `tube`, `path`, `stl`, `file`";
-             return Err(match given {
-                            0 => source.missing("mesh", format!("the scene needs {one}")),
-                            _ => source.error("mesh", format!("{given} kinds of mesh"), one),
-                        });
+            let one = "one of `bar`, `brick`, `tube`, `path`, `stl`, `file`";
+            return Err(match given {
+                0 => source.missing("mesh", format!("the scene needs {one}")),
+                _ => source.error("mesh", format!("{given} kinds of mesh"), one),
+            });
         }
         if self.unit.is_some() && self.file.is_none() {
             return Err(source.unexpected("mesh.unit", "only `mesh.file` has a unit here; remove it"));
@@ -213,8 +213,9 @@ impl MeshSpec {
     pub(super) fn without_unit(&self, source: &Source, mesh: &Mesh) -> Option<SceneError> {
         let [low, high] = mesh.bounds().filter(|_| self.file.is_some() && self.unit.is_none())?;
         let [x, y, z] = [0, 1, 2].map(|d| ((high[d] - low[d]) * 1e6).round() / 1e6);
-         let why =
-                    format!("in metres the part is {x} × {y} × {z} m; write e.g. \"1 mm\", or \"1 m\" if it is so large");
+        let why = format!(
+            "in metres the part is {x} × {y} × {z} m; write e.g. \"1 mm\", or \"1 m\" if it is so large"
+        );
         (x.max(y).max(z) > SUSPICIOUS_SIZE).then(|| source.missing("mesh.unit", why))
     }
 

@@ -1,26 +1,26 @@
 //! TOML scenes of `crystfem`. Only what a scene names is built.
 
-mod text_or_table;
-mod locate_error;
-mod gcode_file;
 mod fit;
 mod fit_part;
 mod fit_spec;
+mod gcode_file;
+mod gcode_setting;
 mod healing;
 mod heat_flow;
+mod locate_error;
 mod material;
 mod mechanics;
 mod memory;
 mod mesh;
 mod part;
-mod selection;
 mod point;
 mod powder;
 mod printing;
 mod problem;
 mod schedule;
-mod gcode_setting;
+mod selection;
 mod study;
+mod text_or_table;
 mod voxels;
 
 pub use fit::{FitScene, Job};
@@ -31,10 +31,10 @@ pub use material::{KineticsSpec, Law, MaterialSpec, MeltingSpec, PropertySpec, S
 pub use mechanics::{Mechanics, MechanicsLaw, MechanicsSpec};
 pub use mesh::{BarSpec, BrickSpec, MeshSpec, SubstrateSpec, TubeSpec};
 pub use part::{BoundarySpec, PartOutput, PartScene, PrintSpec, ProbeSpec, RegionSpec, SourceSpec, TimeSpec};
-pub(crate) use selection::millimetres;
 pub use point::{CompareSpec, ExchangeSpec, LegSpec, NodesSpec, PointScene, PointSpec};
 pub use problem::PartTask;
 pub use schedule::{ScheduleSpec, TimesSpec};
+pub(crate) use selection::millimetres;
 pub use study::{NAMING, StudySpec};
 pub use voxels::{BuiltMesh, Filling, PathSpec, StlSpec};
 
@@ -118,10 +118,10 @@ pub fn kind(source: &Source) -> Result<SceneKind, SceneError> {
     match (asked.next(), asked.next()) {
         (Some((kind, ..)), None) => Ok(*kind),
         (Some((_, first, _)), Some((_, second, _))) => {
-             Err(source.conflict(second, first, "a scene has one task; remove one of them"))
+            Err(source.conflict(second, first, "a scene has one task; remove one of them"))
         }
         (None, _) => {
-             let why = "the scene needs a block `[mesh]`, `[[point]]`, `[[nodes]]` or `[[fit]]`";
+            let why = "the scene needs a block `[mesh]`, `[[point]]`, `[[nodes]]` or `[[fit]]`";
             Err(source.missing("mesh", why))
         }
     }

@@ -275,7 +275,11 @@ impl PartScene {
             let key = format!("probe[{index}].name");
             check_name(source, &key, &probe.name)?;
             if self.probe[..index].iter().any(|other| other.name == probe.name) {
-                return Err(source.error(&key, format!("`{}` twice", probe.name), "a different name for each probe"));
+                return Err(source.error(
+                    &key,
+                    format!("`{}` twice", probe.name),
+                    "a different name for each probe",
+                ));
             }
         }
         if let Some(print) = &self.print {
@@ -304,8 +308,8 @@ impl PartScene {
             ] {
                 if given {
                     let key = format!("time.{key}");
-                     let why = "it belongs to adaptive steps; remove it, or remove `time.step`";
-                                        return Err(source.unexpected(&key, why));
+                    let why = "it belongs to adaptive steps; remove it, or remove `time.step`";
+                    return Err(source.unexpected(&key, why));
                 }
             }
         }
@@ -320,7 +324,8 @@ impl PartScene {
 impl BoundarySpec {
     /// Returns the corners of the box that limits the surface, m.
     pub fn corners(&self) -> Option<[[f64; 3]; 2]> {
-        let corner = |given: &Option<[Length; 3]>, default: f64| given.map_or([default; 3], |x| x.map(|x| x.si()));
+        let corner =
+            |given: &Option<[Length; 3]>, default: f64| given.map_or([default; 3], |x| x.map(|x| x.si()));
         let bounded = self.min.is_some() || self.max.is_some();
         bounded.then(|| [corner(&self.min, f64::NEG_INFINITY), corner(&self.max, f64::INFINITY)])
     }
@@ -333,11 +338,13 @@ impl BoundarySpec {
             return Err(source.error(key, "none or several conditions", allowed));
         }
         if exchange != self.ambient.is_some() {
-             let key = format!("{key}.ambient");
-                        return Err(match exchange {
-                            true => source.missing(&key, "convection and radiation need the temperature of the surroundings"),
-                            false => source.unexpected(&key, "it belongs to `film` and `emissivity`; remove it"),
-                        });
+            let key = format!("{key}.ambient");
+            return Err(match exchange {
+                true => {
+                    source.missing(&key, "convection and radiation need the temperature of the surroundings")
+                }
+                false => source.unexpected(&key, "it belongs to `film` and `emissivity`; remove it"),
+            });
         }
         if self.temperature.is_some() && self.surface == "outer" {
             let key = format!("{key}.surface");
@@ -357,7 +364,11 @@ impl PrintSpec {
     fn check(&self, source: &Source, of_mesh: bool) -> Result<(), SceneError> {
         let along = self.path.is_some();
         if along && of_mesh {
-             return Err(source.conflict("print.path", "mesh.path", "the part is printed along `mesh.path`; remove it"));
+            return Err(source.conflict(
+                "print.path",
+                "mesh.path",
+                "the part is printed along `mesh.path`; remove it",
+            ));
         }
         let layers = self.layers.is_some() || self.elements.is_some() || self.layer_height.is_some();
         if of_mesh && !layers && self.layer_time.is_none() {
@@ -399,7 +410,7 @@ impl PrintSpec {
         ];
         for (name, given, needed, allowed) in needed {
             let key = format!("print.{name}");
-             let kind = if path { "printing along a path" } else { "printing in layers" };
+            let kind = if path { "printing along a path" } else { "printing in layers" };
             if needed && !given {
                 return Err(source.missing(&key, format!("{kind} needs it")));
             }

@@ -96,7 +96,6 @@ pub struct PointSpec {
     pub quick: bool,
 }
 
-
 /// Nodes of a thermal analysis from another program, each with the material.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -183,9 +182,7 @@ impl PointScene {
                 Ok(all)
             }
             (None, true) => Err(source.missing("material", "the scene needs a block `[material]`")),
-            (Some(_), false) => {
-                Err(source.conflict("materials", "material", "keep one of them"))
-            }
+            (Some(_), false) => Err(source.conflict("materials", "material", "keep one of them")),
         }
     }
 
@@ -204,7 +201,11 @@ impl PointScene {
             let names = self.nodes[..index].iter().map(|other| &other.name);
             if names.chain(self.point.iter().map(|point| &point.name)).any(|name| *name == nodes.name) {
                 let found = format!("`{}` twice", nodes.name);
-                return Err(source.error(&key("name"), found, "a different name for each point and analysis"));
+                return Err(source.error(
+                    &key("name"),
+                    found,
+                    "a different name for each point and analysis",
+                ));
             }
             if !source.file(&nodes.file).is_file() {
                 let found = source.file(&nodes.file).display().to_string();
@@ -249,7 +250,9 @@ impl PointScene {
         }
         let known: Vec<&str> = self.materials.keys().map(String::as_str).collect();
         if known.is_empty() {
-            return Err(source.unexpected(key, "the only material is `[material]`, which has no name; remove it"));
+            return Err(
+                source.unexpected(key, "the only material is `[material]`, which has no name; remove it")
+            );
         }
         Err(source.unknown(key, name, &known))
     }

@@ -1,7 +1,7 @@
 //! Print plan of a scene: elements and their birth times, in layers or along a path.
 
-use super::locate_error::located;
 use super::gcode_file;
+use super::locate_error::located;
 use super::part::PrintSpec;
 use super::selection::{elements, millimetres};
 use super::voxels::Filling;
@@ -62,7 +62,8 @@ impl PrintSpec {
         let (window, schedule) = (self.window.map(|window| window.si()), self.schedule(source)?);
         PrintPlan::along(path, times, self.start(), window, schedule.as_ref()).map_err(|error| match error {
             Error::Parameter { name: NOZZLE, found: time, .. } => {
-                 let why = format!("the file sets no nozzle temperature (M104, M109) before {time} s; write it");
+                let why =
+                    format!("the file sets no nozzle temperature (M104, M109) before {time} s; write it");
                 source.missing("print.temperature", why)
             }
             other => located(source, "print.window", &other),

@@ -108,7 +108,8 @@ impl PartScene {
         }
         for (spec, place) in self.probe.iter().zip(&probes) {
             if place.elements().iter().all(|element| absent.binary_search(element).is_ok()) {
-                notes.push(format!("probe `{}` lies where nothing is printed and records nothing", spec.name));
+                notes
+                    .push(format!("probe `{}` lies where nothing is printed and records nothing", spec.name));
             }
         }
         let mut printed: Vec<u32> = births.iter().flat_map(|birth| birth.elements.iter().copied()).collect();

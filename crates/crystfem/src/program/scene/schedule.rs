@@ -1,7 +1,7 @@
 //! Values over time: a constant, a table, a CSV file, a sine, or a setting of a G-code file.
 
-use super::text_or_table::{self, TextOrTable};
 use super::locate_error::{located, located_in};
+use super::text_or_table::{self, TextOrTable};
 use crate::boundary::Schedule;
 use crate::table::{Column, read};
 use harness::scene::{SceneError, Source};
@@ -78,7 +78,10 @@ impl<D: Dimension + Copy> ScheduleSpec<D> {
         }
         if over.cools_to.is_some() || over.cooling_time.is_some() {
             let name = if over.cools_to.is_some() { "cools_to" } else { "cooling_time" };
-             return Err(source.unexpected(&format!("{key}.{name}"), "it belongs to `of = \"bed\"` of a G-code file; remove it"));
+            return Err(source.unexpected(
+                &format!("{key}.{name}"),
+                "it belongs to `of = \"bed\"` of a G-code file; remove it",
+            ));
         }
         if let Some(swing) = over.sine(source, key, table)? {
             return Ok(swing);
@@ -129,7 +132,7 @@ impl<D: Dimension> TextOrTable for ScheduleSpec<D> {
     type Table = TimesSpec<D>;
 
     fn expected() -> String {
-         let others = "{ time = […], value = […] }, { file = … }, { file = …, of = \"bed\" } or \
+        let others = "{ time = […], value = […] }, { file = … }, { file = …, of = \"bed\" } or \
                               { low = …, high = …, period = … }";
         format!("{}, e.g. \"{}\", {others}", D::NAME, D::EXAMPLE)
     }

@@ -273,7 +273,7 @@ fn bad_fits() {
         assert!(parts.iter().all(|part| message.contains(part)), "{parts:?}: {message}");
     }
     // history of the melt: rows before `from`
-     let text = "time [s],temperature [degC],heat_flow [W/g]\n0,200,0\n1,195,0\n9,165,0\n19,165,0\n20,160,0\n\
+    let text = "time [s],temperature [degC],heat_flow [W/g]\n0,200,0\n1,195,0\n9,165,0\n19,165,0\n20,160,0\n\
                     30,150,1\n40,140,0\n";
     std::fs::write(folder.path().join("held.csv"), text).unwrap();
     let held = flow("held.csv", ", from = \"20 s\"", "up").replace(", rate = \"1 K/min\"", "");
@@ -306,7 +306,7 @@ fn an_export_of_netzsch() {
     }
     let latin: Vec<u8> = text.chars().map(|c| u8::try_from(c).unwrap()).collect();
     std::fs::write(folder.path().join("proteus.csv"), latin).unwrap();
-     let fit = "[[fit]]\nname = \"cool\"\nlaw = \"nakamura\"\nequilibrium_melting = \"193.2 degC\"\n\
+    let fit = "[[fit]]\nname = \"cool\"\nlaw = \"nakamura\"\nequilibrium_melting = \"193.2 degC\"\n\
                    glass_transition = \"51 degC\"\n\
                heat_flow = { exothermal = \"up\" }\n\
                data = [{ file = \"proteus.csv\", rate = \"10 K/min\", from = \"185 degC\", to = \"155 degC\" }]\n";

@@ -1,7 +1,7 @@
 //! Meshes of cells that are filled by a G-code file or an STL surface.
 
-use super::locate_error::{located, located_in};
 use super::gcode_file;
+use super::locate_error::{located, located_in};
 use super::memory;
 use crate::error::Error;
 use crate::mesh::path::{Cells, Deposit, ToolPath, read_gcode};
@@ -79,7 +79,6 @@ pub struct StlSpec {
     /// Smallest filled fraction of a cell, as in `mesh.path`.
     pub least: Option<f64>,
 }
-
 
 /// Filled fractions of the elements, and the path that printed them.
 pub struct Filling {
@@ -176,7 +175,7 @@ impl StlSpec {
         let found = format!("{unit} m per unit of the file, which gives a part of {}", box_of([low, high]));
         let [x, y, z] = size.map(|x| rounded(x / unit));
         let allowed = format!(
-             "a `unit` that makes the largest side {} mm to {most} m, and the part larger than a cell \
+            "a `unit` that makes the largest side {} mm to {most} m, and the part larger than a cell \
                          (the file contains {x} × {y} × {z}; write e.g. \"1 m\" if these are metres)",
             1e3 * least
         );
@@ -213,9 +212,9 @@ fn finish(
     }
     let most = voxels.fill.iter().copied().fold(0.0, f64::max);
     notes.push(match fill {
-        true => format!(
-            "{text}; density and conductivity are scaled by the filled fraction, at most {most:.3}"
-        ),
+        true => {
+            format!("{text}; density and conductivity are scaled by the filled fraction, at most {most:.3}")
+        }
         false => text,
     });
     if voxels.left_out > 1e-6 {

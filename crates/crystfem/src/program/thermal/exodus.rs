@@ -2,7 +2,7 @@
 //! A Finite Element Data Model").
 
 use super::netcdf::Netcdf;
-use super::{Analysis, ThermalFrame, CellsByDimension, choose_array, data_error};
+use super::{Analysis, CellsByDimension, ThermalFrame, choose_array, data_error};
 use crate::error::Error;
 use harness::output::vtkhdf::Cells;
 use std::path::Path;
@@ -84,7 +84,10 @@ fn cells(file: &mut Netcdf, path: &Path, nodes: usize) -> Result<Cells, Error> {
             let mut places = Vec::with_capacity(own);
             for &node in element {
                 if !(1.0..=nodes as f64).contains(&node) {
-                    return Err(data_error(path, &format!("found node {node} in `{name}`; allowed: 1 to {nodes}")));
+                    return Err(data_error(
+                        path,
+                        &format!("found node {node} in `{name}`; allowed: 1 to {nodes}"),
+                    ));
                 }
                 places.push(node as u32 - 1);
             }

@@ -3,7 +3,7 @@
 //! Columns are fixed (CalculiX GraphiX manual, "Result Format"): a data line begins with −1 in three columns,
 //! followed by a number in ten columns and numbers in twelve columns each.
 
-use super::{Analysis, ThermalFrame, CellsByDimension};
+use super::{Analysis, CellsByDimension, ThermalFrame};
 use crate::error::Error;
 use harness::output::vtkhdf::Cells;
 use std::collections::HashMap;

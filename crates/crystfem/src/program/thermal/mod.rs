@@ -52,8 +52,9 @@ pub fn open(path: &Path, array: Option<&str>) -> Result<Analysis, Error> {
                 }
                 _ => "",
             };
-            let reason =
-                format!("found extension `{ending}`; allowed: frd, pvd, vtu, pvtu, xdmf, xmf, e, ex2, exo, g{advice}");
+            let reason = format!(
+                "found extension `{ending}`; allowed: frd, pvd, vtu, pvtu, xdmf, xmf, e, ex2, exo, g{advice}"
+            );
             Err(data_error(path, &reason))
         }
     }

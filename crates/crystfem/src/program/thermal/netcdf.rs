@@ -21,9 +21,9 @@ enum NetcdfFormat {
 }
 
 impl Netcdf {
-     /// Opens a file.
-        ///
-        /// # Errors
+    /// Opens a file.
+    ///
+    /// # Errors
     /// Returns an error for other formats, and I/O errors.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let read = |path: &Path| -> std::io::Result<([u8; 4], u64)> {
@@ -38,7 +38,9 @@ impl Netcdf {
                 let file = FileReader::open(path).map_err(|error| data_error(path, &format!("{error:?}")))?;
                 NetcdfFormat::Classic(Box::new(file))
             }
-            b"\x89HDF" => NetcdfFormat::Hdf5(H5File::open(path).map_err(|error| data_error(path, &error.to_string()))?),
+            b"\x89HDF" => {
+                NetcdfFormat::Hdf5(H5File::open(path).map_err(|error| data_error(path, &error.to_string()))?)
+            }
             _ => {
                 return Err(data_error(
                     path,
@@ -76,7 +78,9 @@ impl Netcdf {
         let count = shape.iter().try_fold(8u64, |product, &size| product.checked_mul(size as u64));
         // a byte of the file gives at most eight bytes in memory, or 1032 times as many if compressed
         if count.is_none_or(|count| count > (1 << 22) + 8 * 1032 * self.bytes) {
-            return Err(self.wrong(name, format!("found shape {shape:?}; allowed: at most the size of the file")));
+            return Err(
+                self.wrong(name, format!("found shape {shape:?}; allowed: at most the size of the file"))
+            );
         }
         let found = match &mut self.format {
             NetcdfFormat::Classic(file) => {
@@ -96,7 +100,8 @@ impl Netcdf {
             }
             NetcdfFormat::Hdf5(file) => {
                 let dataset = dataset(file, name, self.bytes).map_err(|error| error.to_string());
-                dataset.and_then(|dataset| read_hdf5(&dataset, &shape, row).map_err(|error| error.to_string()))
+                dataset
+                    .and_then(|dataset| read_hdf5(&dataset, &shape, row).map_err(|error| error.to_string()))
             }
         };
         found.map_err(|reason| self.wrong(name, reason))

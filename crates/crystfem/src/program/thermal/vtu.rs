@@ -4,7 +4,7 @@
 //! Format: <https://docs.vtk.org/en/latest/vtk_file_formats/vtkxml_file_format.html>. `vtkio` 0.7 panics on
 //! damaged files.
 
-use super::{Analysis, ThermalFrame, CellsByDimension, choose_array, data_error};
+use super::{Analysis, CellsByDimension, ThermalFrame, choose_array, data_error};
 use crate::error::Error;
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
@@ -42,7 +42,10 @@ pub fn open(path: &Path, array: Option<&str>) -> Result<Analysis, Error> {
         if temperature.len() != nodes {
             let found = format!("found {} values of `{name}`", temperature.len());
             let path = parts.first().map_or(Path::new(""), PathBuf::as_path);
-            return Err(data_error(path, &format!("{found}; allowed: {nodes}, one per node of the first time")));
+            return Err(data_error(
+                path,
+                &format!("{found}; allowed: {nodes}, one per node of the first time"),
+            ));
         }
         Ok(ThermalFrame { time, temperature })
     });
@@ -66,7 +69,10 @@ fn series(path: &Path) -> Result<Vec<(f64, Vec<PathBuf>)>, Error> {
         if name == "DataSet" {
             let number = attributes.get("timestep").and_then(|time| time.parse::<f64>().ok());
             let (Some(time), Some(file)) = (number, attributes.get("file")) else {
-                return Err(data_error(path, "found a DataSet without them; allowed: `timestep`, a number, and `file`"));
+                return Err(data_error(
+                    path,
+                    "found a DataSet without them; allowed: `timestep`, a number, and `file`",
+                ));
             };
             match files.iter_mut().find(|(other, _)| *other == time) {
                 Some((_, parts)) => parts.push(beside(path, file)),
@@ -177,7 +183,9 @@ impl VtuGrid {
         }
         // a part of a parallel run may be empty, but not the whole grid
         let first = files.first().filter(|_| grid.points.is_empty());
-        first.map_or(Ok(grid), |path| Err(data_error(path, "found no points; allowed: at least one Piece with Points")))
+        first.map_or(Ok(grid), |path| {
+            Err(data_error(path, "found no points; allowed: at least one Piece with Points"))
+        })
     }
 
     fn read(&mut self, path: &Path) -> Result<(), Error> {
@@ -243,7 +251,10 @@ impl VtuGrid {
             let own = piece.nodes.get(begin..end as usize);
             let fits = |&node: &f64| (0.0..nodes as f64).contains(&node);
             let Some(own) = own.filter(|own| own.iter().all(fits)) else {
-                let reason = format!("found a cell that ends at {end} with invalid nodes; allowed: nodes 0 to {}", nodes.max(1) - 1);
+                let reason = format!(
+                    "found a cell that ends at {end} with invalid nodes; allowed: nodes 0 to {}",
+                    nodes.max(1) - 1
+                );
                 return Err(data_error(path, &reason));
             };
             let own: Vec<u32> = own.iter().map(|&node| first as u32 + node as u32).collect();

@@ -6,7 +6,7 @@
 use super::netcdf::Netcdf;
 use super::vtu::numbers;
 use super::xml::{XmlElement, read};
-use super::{Analysis, ThermalFrame, CellsByDimension, choose_array, data_error};
+use super::{Analysis, CellsByDimension, ThermalFrame, choose_array, data_error};
 use crate::error::Error;
 use std::path::{Path, PathBuf};
 
@@ -56,7 +56,9 @@ pub fn open(path: &Path, array: Option<&str>) -> Result<Analysis, Error> {
         return Err(wrong("found no Grid with Topology and Geometry; allowed: at least one"));
     };
     let points = mesh.child("Geometry").map_or(Ok(Vec::new()), |geometry| file.points(geometry))?;
-    let cells = mesh.child("Topology").map_or(Ok(CellsByDimension::default()), |own| file.cells(own, points.len()))?;
+    let cells = mesh
+        .child("Topology")
+        .map_or(Ok(CellsByDimension::default()), |own| file.cells(own, points.len()))?;
     let cells = cells.highest().ok_or_else(|| wrong("found no elements; allowed: at least one"))?;
     let mut names: Vec<String> = Vec::new();
     for attribute in grids.iter().flat_map(|grid| grid.all("Attribute")).filter(|own| is_scalar(own)) {
@@ -156,9 +158,9 @@ impl Xdmf {
         let fits = (size == 1 || axes.len() == 1) && axes.len() <= 3;
         if count == 0 || !fits || axes.iter().any(|axis| axis.len() != count * size) {
             let found: Vec<usize> = axes.iter().map(Vec::len).collect();
-            return Err(
-                self.wrong(format!("found {found:?} numbers in geometry {kind}; allowed: all coordinates of each node"))
-            );
+            return Err(self.wrong(format!(
+                "found {found:?} numbers in geometry {kind}; allowed: all coordinates of each node"
+            )));
         }
         let place = |k: usize| {
             let mut point = [0.0; 3];
@@ -186,9 +188,8 @@ impl Xdmf {
         let mut push = |vtk: u64, own: &[f64]| {
             let fits = |node: &f64| (0.0..nodes as f64).contains(node);
             if let Some(node) = own.iter().find(|node| !fits(node)) {
-                return Err(
-                    self.wrong(format!("found node {node} in an element; allowed: 0 to {}", nodes.max(1) - 1))
-                );
+                return Err(self
+                    .wrong(format!("found node {node} in an element; allowed: 0 to {}", nodes.max(1) - 1)));
             }
             cells.push(vtk, &own.iter().map(|&node| node as u32).collect::<Vec<u32>>());
             Ok(())
