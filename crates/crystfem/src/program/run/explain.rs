@@ -50,7 +50,6 @@ pub fn explain_scene(
             mechanics.settings.bed.len(),
             if mechanics.settings.release { ", released at the end" } else { "" },
              mechanics.settings.strain_step
-                        
         ));
     }
     if task.mechanics.as_ref().is_some_and(|mechanics| mechanics.stiff) {
