@@ -249,11 +249,11 @@ fn scenes_of_peri() {
 
 #[test]
 fn scenes_of_crystfem() {
-    use crystfem::program::scene::{FitScene, Kind, PartScene, PointScene, kind};
+    use crystfem::program::scene::{FitScene, PartScene, PointScene, SceneKind, kind};
     attack_scenes(&cases("crystfem"), |source| match kind(source)? {
-        Kind::Part => source.parse::<PartScene>()?.check(source),
-        Kind::Point => source.parse::<PointScene>().map(|_| ()),
-        Kind::Fit => source.parse::<FitScene>().map(|_| ()),
+        SceneKind::Part => source.parse::<PartScene>()?.check(source),
+        SceneKind::Point => source.parse::<PointScene>().map(|_| ()),
+        SceneKind::Fit => source.parse::<FitScene>().map(|_| ()),
     });
 }
 

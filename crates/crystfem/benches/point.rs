@@ -1,14 +1,14 @@
-//! The material point that is measured; `cargo bench` takes it, too.
+//! Material point of the benchmarks.
 
 use crystfem::kinetics::{KineticConstants, Kinetics};
 use crystfem::material::{PointInput, Polymer, Semicrystalline, ThermalProperty};
 use crystfem::melting::Melting;
 
-/// What is asked of it: a name, the temperature before in K, and its increment.
+/// Steps to measure: name, start temperature in K, and increment.
 pub const STEPS: [(&str, f64, f64); 3] =
     [("cooling", 425.0, -0.5), ("heating", 425.0, 0.5), ("heating above melting", 500.0, 0.5)];
 
-/// PA12 after column 1 of Table 4.1, with latent heat in J/kg or without.
+/// Creates PA12 with column 1 of Table 4.1, and latent heat in J/kg if given.
 pub fn polymer(latent_heat: Option<f64>) -> Result<Semicrystalline, crystfem::Error> {
     Semicrystalline::new(Polymer {
         density: 1010.0,
@@ -22,7 +22,7 @@ pub fn polymer(latent_heat: Option<f64>) -> Result<Semicrystalline, crystfem::Er
     })
 }
 
-/// A step of 0.5 s.
+/// Creates a step of 0.5 s.
 pub fn point(temperature: f64, increment: f64) -> PointInput {
     PointInput { temperature, increment, gradient: Default::default(), dt: 0.5 }
 }

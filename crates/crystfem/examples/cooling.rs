@@ -1,4 +1,4 @@
-//! PA12 cooled at three rates: where half of it has crystallized, and what survives heating again.
+//! PA12 cooled at three rates: temperature of half crystallization, and crystals that survive heating.
 
 use crystfem::kinetics::{KineticConstants, Kinetics, cooling_curve};
 use crystfem::melting::Melting;

@@ -1,4 +1,4 @@
-//! A hot block of PA12 in still air: temperatures in its middle and on a corner, and where the heat went.
+//! Hot block of PA12 in still air: temperatures in its middle and at a corner, and energy balance.
 
 use crystfem::boundary::{Condition, FaceSelection, Schedule};
 use crystfem::material::{Conductor, ThermalProperty};
@@ -30,7 +30,7 @@ fn main() -> Result<(), crystfem::Error> {
     }
     let ledger = &simulation.state().ledger;
     println!(
-        "{:.1} J gone through the surface, {:.1e} of it unaccounted for",
+        "{:.1} J lost through the surface, relative balance error {:.1e}",
         -ledger.exchange.total(),
         ledger.worst
     );

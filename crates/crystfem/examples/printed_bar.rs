@@ -1,4 +1,5 @@
-//! A bar of PA12, printed in eight layers onto glass: temperature and crystallinity in the first and in the last layer.
+//! A bar of PA12 printed in eight layers on glass: temperature and crystallinity in the first and the last
+//! layer.
 
 use crystfem::material::{Conductor, Semicrystalline, ThermalProperty};
 use crystfem::mesh::{Bar, Substrate};

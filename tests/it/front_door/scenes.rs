@@ -85,15 +85,15 @@ fn parts_of_crystfem() {
 /// Kinetics and fits, with their tables.
 #[test]
 fn points_and_fits_of_crystfem() {
-    use crystfem::program::scene::{Kind, kind};
+    use crystfem::program::scene::{SceneKind, kind};
     for file in cases("crystfem") {
         let source = Source::read(&file).unwrap();
-        if kind(&source).unwrap() == Kind::Part {
+        if kind(&source).unwrap() == SceneKind::Part {
             continue;
         }
         let folder = file.parent().unwrap().to_owned();
         attack("points", &folder, &[file], |source| match kind(source).map_err(|error| error.render())? {
-            Kind::Part => Ok(()),
+            SceneKind::Part => Ok(()),
             _ => crystfem::program::run::explain(source, false).map(|_| ()).map_err(message),
         });
     }

@@ -1,4 +1,4 @@
-//! What several tests are made of.
+//! Materials, meshes and conditions shared by tests.
 
 use crystfem::boundary::{Condition, FaceSelection, Field, Schedule};
 use crystfem::kinetics::{KineticConstants, Kinetics};
@@ -18,7 +18,7 @@ pub fn conductor([k, density, c]: [f64; 3]) -> Arc<dyn ThermalMaterial> {
     Arc::new(Conductor::new(density, property("k", k), property("c", c)).unwrap())
 }
 
-/// Semicrystalline PA12, Table 4.1, column 1.
+/// Creates semicrystalline PA12, Table 4.1, column 1.
 pub fn pa12(latent_heat: Option<f64>) -> Arc<dyn ThermalMaterial> {
     let polymer = Polymer {
         density: PA12[1],
@@ -57,7 +57,7 @@ pub fn everywhere() -> FaceSelection {
     FaceSelection::Outer { except: Vec::new() }
 }
 
-/// Advances, and returns every step.
+/// Advances the simulation and returns all steps.
 pub fn run(simulation: &mut Simulation, until: f64) -> Vec<StepBalance> {
     let mut records = Vec::new();
     let _ = simulation

@@ -1,4 +1,4 @@
-//! Observed orders of convergence with the manufactured solution of formulation.md.
+//! Observed convergence orders for the manufactured solution of formulation.md.
 
 use crate::bodies::{PA12, conductor, grid, run};
 use crystfem::boundary::{Field, HeatSource};
@@ -35,7 +35,7 @@ fn mesh(elements: usize, split: CellSplit, distortion: f64) -> Mesh {
     grid.blocks(&[block], split).unwrap().distorted(distortion).unwrap()
 }
 
-/// Root mean square over the nodes.
+/// Computes the root mean square error over the nodes.
 fn error(simulation: &Simulation) -> f64 {
     let points = &simulation.problem().mesh.points;
     let squares = simulation.temperatures(f64::NAN).into_iter().zip(points).map(|(found, &place)| {
@@ -72,7 +72,7 @@ fn order_two_in_space() {
     }
 }
 
-/// Second-order elements: three in L2 (Strang & Fix, 1973), here at the nodes, of any shape.
+/// Second-order elements of any shape: order three in L2 (Strang & Fix, 1973), here at the nodes.
 #[test]
 fn order_three_in_space_of_second_order_elements() {
     for (split, distortion) in [
@@ -88,7 +88,7 @@ fn order_three_in_space_of_second_order_elements() {
             let simulation = &simulation;
             let points = &simulation.problem().mesh.points;
             let exact = |k: usize| EXACT.temperature(points[k], simulation.time());
-            // L2 over the elements, by their volumes at nodes and middles
+            // L2 over the elements, weighted by nodal volumes
             let found = simulation.temperatures(f64::NAN);
             let volumes = simulation
                 .volumes(&(0..simulation.problem().mesh.element_count() as u32).collect::<Vec<_>>());
@@ -97,12 +97,12 @@ fn order_three_in_space_of_second_order_elements() {
         });
         let order = (errors[0] / errors[1]).ln() / (8.0f64 / 6.0).ln();
         println!("{split:?} {distortion} second order: {errors:?}, order {order}");
-        // 3 in the limit; nodes of regular meshes have more
+        // 3 in the limit; more at nodes of regular meshes
         assert!(order > 2.9 && order < 4.0, "{split:?} {distortion}: {errors:?}, order {order}");
     }
 }
 
-/// Differences between halved steps, on one mesh, so that no error of space is in them.
+/// Differences between halved steps on one mesh, which exclude the error in space.
 #[test]
 fn order_in_time_is_the_schemes() {
     for (scheme, order) in [(Scheme::BackwardEuler, 1.0), (Scheme::TrBdf2, 2.0)] {
@@ -118,7 +118,7 @@ fn order_in_time_is_the_schemes() {
     }
 }
 
-/// The error control holds: the true temporal error falls with the tolerance, and costs fewer steps than Euler's.
+/// Error control: the true temporal error falls with the tolerance, with fewer steps than Euler's.
 #[test]
 fn adaptive_steps_follow_their_tolerance() {
     let end = |scheme, tolerance| {
@@ -138,7 +138,7 @@ fn adaptive_steps_follow_their_tolerance() {
             ((found - exact).abs(), steps)
         });
         println!("{scheme:?}: {runs:?}");
-        // errors of steps add up at most
+        // errors of the steps add up at most
         for ((error, steps), tolerance) in runs.into_iter().zip([1e-1, 1e-2, 1e-3]) {
             assert!(error < tolerance * steps as f64, "{scheme:?}: {runs:?}");
         }

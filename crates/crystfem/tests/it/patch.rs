@@ -40,11 +40,11 @@ fn a_linear_field_is_exact_on_distorted_meshes() {
             let tolerance = if second { 1e-11 } else { 1e-10 };
             let settings = Settings { tolerance, ..Settings::backward_euler(1e9) };
             let mut simulation = Simulation::new(problem, settings).unwrap();
-            // each step leaves τ/Δt ≈ 1e-7 of what was there
+            // each step leaves τ/Δt ≈ 1e-7 of the initial field
             run(&mut simulation, 4e9);
             let points = &simulation.problem().mesh.points;
             for (found, &place) in simulation.temperatures(0.0).iter().zip(points) {
-                // rounding of a solve with 350 K
+                // rounding of a solve at 350 K
                 let error = (found - linear(place)).abs();
                 assert!(error < 1e-9, "{split:?} {second} {capacity:?}: {found} at {place:?}");
             }
@@ -52,7 +52,7 @@ fn a_linear_field_is_exact_on_distorted_meshes() {
     }
 }
 
-/// The same with the gradient driven by a flux: 1000 W/m² through a bar with one end held.
+/// A flux gives its gradient: 1000 W/m² through a bar with one fixed end.
 #[test]
 fn a_flux_makes_its_gradient() {
     for (split, second) in [
@@ -87,7 +87,7 @@ fn a_flux_makes_its_gradient() {
             let exact = 300.0 + 1e3 / PA12[0] * place[0];
             assert!((found - exact).abs() < 1e-9, "{split:?} {second}: {found}, {exact} at {place:?}");
         }
-        // all heat that goes in is taken by the support: 1e3 W/m² × 1e-4 m²
+        // the support takes all supplied heat: 1e3 W/m² × 1e-4 m²
         assert!(simulation.state().ledger.worst < 1e-10, "{:?}", simulation.state().ledger);
         assert!((simulation.state().exchange.flux - 0.1).abs() < 1e-15);
     }

@@ -1,4 +1,4 @@
-//! A printed part in a few lines is the one of the scene.
+//! A printed part from the library equals that of the scene.
 
 use crystfem::Error;
 use crystfem::material::{Conductor, Semicrystalline, ThermalProperty};
@@ -38,14 +38,14 @@ fn equals_the_scene() {
         simulation.run_until(22.0).unwrap();
         simulation.temperatures(0.0)
     });
-    // the order of materials and conditions differs, and with it that of sums
+    // materials and conditions have another order, and so have sums
     let [a, b] = &temperatures;
     let apart = a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(apart < 1e-5, "{apart} K");
 }
 
 #[test]
-fn faults_are_named() {
+fn errors_name_the_parameter() {
     let bar =
         || PrintedPart::bar(&Bar::new([0.01, 0.01], 2, 1e-3), Semicrystalline::pa12().unwrap()).unwrap();
     let fault = |part: PrintedPart| match part.problem() {

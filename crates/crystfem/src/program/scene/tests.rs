@@ -31,8 +31,8 @@ fn head(rest: &str) -> String {
     format!("version = 1\nprogram = \"crystfem\"\n{rest}")
 }
 
-/// What `crystfem check` says of a scene.
-fn complaint(text: &str, folder: &std::path::Path) -> String {
+/// Returns what `crystfem check` prints for a scene.
+fn check_output(text: &str, folder: &std::path::Path) -> String {
     let source = Source::new(folder.join("case.toml"), text);
     let result = crate::program::run::explain(&source, false);
     result.map_or_else(|error| error.to_string(), |lines| lines.join("\n"))
@@ -46,11 +46,11 @@ fn replaced(text: &str, from: &str, to: &str) -> String {
 #[test]
 fn a_good_scene_is_explained() {
     let folder = tempfile::tempdir().unwrap();
-    let lines = complaint(&head(&format!("{MATERIAL}{POINT}")), folder.path());
+    let lines = check_output(&head(&format!("{MATERIAL}{POINT}")), folder.path());
     assert!(lines.contains("material: Semicrystalline, linear heat, melting, no latent heat"), "{lines}");
     assert!(lines.contains("point a: prescribed temperature, 1 segments, 4800 s; adaptive steps"), "{lines}");
     std::fs::write(folder.path().join("a.csv"), "temperature [degC],alpha\n160,0.1\n150,0.5\n").unwrap();
-    let lines = complaint(&head(FIT), folder.path());
+    let lines = check_output(&head(FIT), folder.path());
     let how =
         "separator `,`, decimal point, UTF-8, headings in line 1, columns `temperature [degC]`, `alpha`";
     assert_eq!(
@@ -59,7 +59,7 @@ fn a_good_scene_is_explained() {
     );
 }
 
-/// Every fault is named with key, what was found and what is allowed.
+/// Each error states key, value and allowed values.
 #[test]
 fn bad_points() {
     let good = head(&format!("{MATERIAL}{POINT}"));
@@ -170,7 +170,7 @@ fn bad_points() {
     let folder = tempfile::tempdir().unwrap();
     let mut missed = Vec::new();
     for (from, to, parts) in cases {
-        let message = complaint(&replaced(&good, from, to), folder.path());
+        let message = check_output(&replaced(&good, from, to), folder.path());
         if !parts.iter().all(|part| message.contains(part)) {
             missed.push(format!("{to}: {message}"));
         }
@@ -201,7 +201,7 @@ fn bad_fits() {
         ("name = \"a\"", "name = \"\"", &["it names files"]),
     ];
     for (from, to, parts) in cases {
-        let message = complaint(&replaced(&good, from, to), folder.path());
+        let message = check_output(&replaced(&good, from, to), folder.path());
         assert!(parts.iter().all(|part| message.contains(part)), "{to}: {message}");
     }
     std::fs::write(
@@ -217,11 +217,11 @@ fn bad_fits() {
         let flow = format!("heat_flow = {{ exothermal = \"{up}\" }}\n{data}");
         replaced(&good, "data = [{ file = \"a.csv\", rate = \"1 K/min\" }]", &flow)
     };
-    let lines = complaint(&flow("w.csv", "", "up"), folder.path());
+    let lines = check_output(&flow("w.csv", "", "up"), folder.path());
     assert!(lines.ends_with("3 measurements in 1 runs; peaks of 9.0000 J/g"), "{lines}");
-    let lines = complaint(&flow("mw.csv", ", mass = \"2 mg\"", "down"), folder.path());
+    let lines = check_output(&flow("mw.csv", ", mass = \"2 mg\"", "down"), folder.path());
     assert!(lines.ends_with("; peaks of 4.5000 J/g"), "{lines}");
-    let lines = complaint(&flow("w.csv", ", from = \"4.5 s\", to = \"162.5 degC\"", "up"), folder.path());
+    let lines = check_output(&flow("w.csv", ", from = \"4.5 s\", to = \"162.5 degC\"", "up"), folder.path());
     assert!(lines.ends_with("; peaks of 2.2500 J/g"), "{lines}");
     let two = flow("w.csv", "", "up");
     let block = two.find("[[fit]]").unwrap();
@@ -269,11 +269,12 @@ fn bad_fits() {
         ),
     ];
     for (text, parts) in cases {
-        let message = complaint(text, folder.path());
+        let message = check_output(text, folder.path());
         assert!(parts.iter().all(|part| message.contains(part)), "{parts:?}: {message}");
     }
-    // rows before `from`, from the last one in the melt on
-    let text = "time [s],temperature [degC],heat_flow [W/g]\n0,200,0\n1,195,0\n9,165,0\n19,165,0\n20,160,0\n30,150,1\n40,140,0\n";
+    // history of the melt: rows before `from`
+    let text = "time [s],temperature [degC],heat_flow [W/g]\n0,200,0\n1,195,0\n9,165,0\n19,165,0\n20,160,0\n\
+                    30,150,1\n40,140,0\n";
     std::fs::write(folder.path().join("held.csv"), text).unwrap();
     let held = flow("held.csv", ", from = \"20 s\"", "up").replace(", rate = \"1 K/min\"", "");
     let source = Source::new(folder.path().join("case.toml"), &held);
@@ -281,7 +282,7 @@ fn bad_fits() {
     let (_, peaks) = &scene.jobs(&source).unwrap()[0];
     let times: Vec<f64> = peaks[0].history.iter().map(|row| row[0]).collect();
     assert_eq!(times, [1.0, 9.0, 19.0, 20.0]);
-    // two rows for three constants are found by the fit itself
+    // two rows for three constants are an error of the fit itself
     let source = Source::new(folder.path().join("case.toml"), good);
     let output = folder.path().join("out");
     let result =
@@ -290,8 +291,9 @@ fn bad_fits() {
     assert!(error.contains("`fit[0].data`") && error.contains("2 measurements for 3 parameters"), "{error}");
 }
 
-/// An export of Netzsch Proteus as it is: `##` before the headings, `;`, decimal commas, Latin-1. The peak
-/// q = 0.5 W/g e^{−((T − 170 °C)/4 K)²} of a run at 10 K/min over 0.05 W/g has ΔH = √π · 4 K · 0.5 W/g · 6 s/K = 21.2694 J/g.
+/// An original export of Netzsch Proteus: `##` before the headings, `;`, decimal commas, Latin-1. The peak q
+/// = 0.5 W/g e^{−((T − 170 °C)/4 K)²} of a run at 10 K/min over 0.05 W/g has ΔH = √π · 4 K · 0.5 W/g · 6 s/K
+/// = 21.2694 J/g.
 #[test]
 fn an_export_of_netzsch() {
     let folder = tempfile::tempdir().unwrap();
@@ -304,10 +306,11 @@ fn an_export_of_netzsch() {
     }
     let latin: Vec<u8> = text.chars().map(|c| u8::try_from(c).unwrap()).collect();
     std::fs::write(folder.path().join("proteus.csv"), latin).unwrap();
-    let fit = "[[fit]]\nname = \"cool\"\nlaw = \"nakamura\"\nequilibrium_melting = \"193.2 degC\"\nglass_transition = \"51 degC\"\n\
+    let fit = "[[fit]]\nname = \"cool\"\nlaw = \"nakamura\"\nequilibrium_melting = \"193.2 degC\"\n\
+                   glass_transition = \"51 degC\"\n\
                heat_flow = { exothermal = \"up\" }\n\
                data = [{ file = \"proteus.csv\", rate = \"10 K/min\", from = \"185 degC\", to = \"155 degC\" }]\n";
-    let lines = complaint(&head(fit), folder.path());
+    let lines = check_output(&head(fit), folder.path());
     assert!(lines.ends_with("; peaks of 21.2694 J/g"), "{lines}");
     assert!(lines.contains("separator `;`, decimal comma, Latin-1, headings in line 5"), "{lines}");
 }

@@ -1,9 +1,9 @@
-//! Elements and places as a scene names them.
+//! Elements and coordinates of a scene.
 
 use crate::mesh::Mesh;
 use harness::scene::{SceneError, Source};
 
-/// An element set, or all elements.
+/// Returns the elements of a set, or all elements.
 pub(super) fn elements(
     source: &Source,
     mesh: &Mesh,
@@ -17,9 +17,9 @@ pub(super) fn elements(
     })
 }
 
-/// A place as a scene would have it.
+/// Formats a point in mm, as a scene writes it.
 pub(crate) fn millimetres(place: [f64; 3]) -> String {
-    // to a nanometre: what was written, not its rounding
+    // rounded to a nanometre, which removes rounding errors of the unit
     let [x, y, z] = place.map(|x| (1e9 * x).round() / 1e6);
     format!("({x}, {y}, {z}) mm")
 }

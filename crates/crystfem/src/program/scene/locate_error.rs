@@ -1,9 +1,9 @@
-//! Errors of the physics at their keys in a scene.
+//! Locates errors of the physics at their keys in a scene.
 
 use crate::error::Error;
 use harness::scene::{SceneError, Source};
 
-/// An error at a key: values with what is allowed, names with those that are known.
+/// Converts an error to a scene error at `key`, with the allowed values or known names.
 pub fn located(source: &Source, key: &str, error: &Error) -> SceneError {
     match error {
         Error::Parameter { name, found, allowed } => source.error(key, format!("{name} = {found}"), allowed),
@@ -15,7 +15,8 @@ pub fn located(source: &Source, key: &str, error: &Error) -> SceneError {
     }
 }
 
-/// An error of a block, at the key inside it that holds the parameter: `keys` are names of parameters and keys.
+/// Converts an error of a block to a scene error at the key of its parameter; `keys` pairs parameters with
+/// keys.
 pub fn located_in(source: &Source, block: &str, keys: &[(&str, &str)], error: &Error) -> SceneError {
     let key = match error {
         Error::Parameter { name, .. } => keys.iter().find(|(parameter, _)| parameter == name),

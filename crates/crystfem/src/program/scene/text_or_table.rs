@@ -1,4 +1,4 @@
-//! Values that may be written as a text or as a table, without losing the place of an error.
+//! Values written as a string or a table, with errors at their place in the scene.
 
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{DeserializeOwned, Error, MapAccess, Visitor};
@@ -6,35 +6,35 @@ use serde::{Deserialize, Deserializer};
 use std::fmt;
 use std::marker::PhantomData;
 
-/// What is written either way.
+/// Value that a scene can write as a string or a table.
 pub trait TextOrTable: Sized {
-    /// The table.
+    /// Type of the table.
     type Table: DeserializeOwned;
 
-    /// Both ways, for messages.
+    /// Describes both forms, for error messages.
     fn expected() -> String;
 
-    /// From a text.
+    /// Parses the string.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// Returns what is wrong with it.
     fn from_text<E: Error>(text: &str) -> Result<Self, E>;
 
-    /// From a table.
+    /// Converts the table.
     fn from_table(table: Self::Table) -> Self;
 }
 
-/// For `#[serde(deserialize_with = …)]` or a hand-written `Deserialize`.
+/// Deserializes either form, for `#[serde(deserialize_with = …)]` or a `Deserialize` implementation.
 ///
 /// # Errors
-/// The deserializer's.
+/// Returns the errors of the deserializer.
 pub fn deserialize<'de, T: TextOrTable, D: Deserializer<'de>>(deserializer: D) -> Result<T, D::Error> {
-    deserializer.deserialize_any(Either(PhantomData))
+    deserializer.deserialize_any(TextOrTableVisitor(PhantomData))
 }
 
-struct Either<T>(PhantomData<T>);
+struct TextOrTableVisitor<T>(PhantomData<T>);
 
-impl<'de, T: TextOrTable> Visitor<'de> for Either<T> {
+impl<'de, T: TextOrTable> Visitor<'de> for TextOrTableVisitor<T> {
     type Value = T;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -1,17 +1,18 @@
-//! A picture of the warped part.
+//! Picture of the warped part.
 
-use super::outside::{Frame, Outside};
+use super::part_skin::{PartSkin, SolidFrame};
 use crate::coupling::StressCoupling;
 use crate::error::Error;
-use crate::program::scene::{PartScene, Task};
+use crate::program::scene::{PartScene, PartTask};
 use harness::output::picture::{ColorMap, Solids, Strip};
 use std::path::Path;
 
-/// The largest displacement over the size of the part that is well seen.
-const SEEN: f64 = 0.1;
+/// Drawn displacement over the size of the part, by default.
+const DRAWN_DISPLACEMENT: f64 = 0.1;
 
-/// warped.png: what bears stress at the end, displacements magnified by `output.magnify`, with its lift and its Mises stress.
-pub fn draw(scene: &PartScene, task: &Task, stress: &StressCoupling, output: &Path) -> Result<(), Error> {
+/// Draws warped.png: the parts that bear stress at the end, displacements magnified by `output.magnify`,
+/// colored by lift and Mises stress.
+pub fn draw(scene: &PartScene, task: &PartTask, stress: &StressCoupling, output: &Path) -> Result<(), Error> {
     let mesh = &task.problem.mesh;
     let stresses = stress.mises();
     let own: Vec<u32> =
@@ -20,7 +21,10 @@ pub fn draw(scene: &PartScene, task: &Task, stress: &StressCoupling, output: &Pa
     let moved = stress.displacement();
     let most = moved.chunks(3).map(|u| u[0].hypot(u[1]).hypot(u[2])).filter(|u| u.is_finite());
     let size = (0..3).map(|d| bounds[1][d] - bounds[0][d]).fold(0.0, f64::max);
-    let factor = scene.output.magnify.unwrap_or_else(|| round(SEEN * size / most.fold(0.0, f64::max)));
+    let factor = scene
+        .output
+        .magnify
+        .unwrap_or_else(|| round_down(DRAWN_DISPLACEMENT * size / most.fold(0.0, f64::max)));
     let shown = |node: usize, d: usize| {
         let u = moved[3 * node + d];
         mesh.points[node][d] + if u.is_finite() { factor * u } else { 0.0 }
@@ -35,7 +39,7 @@ pub fn draw(scene: &PartScene, task: &Task, stress: &StressCoupling, output: &Pa
         }
     }
     let lift: Vec<f64> = moved.chunks(3).map(|u| 1e3 * u[2]).collect();
-    // stresses are those of elements: at a node the mean of those around it
+    // stress is constant per element: each node gets the mean of its elements
     let mut around = vec![(0.0, 0.0); mesh.points.len()];
     for &element in &own {
         for &node in mesh.nodes(element) {
@@ -57,17 +61,17 @@ pub fn draw(scene: &PartScene, task: &Task, stress: &StressCoupling, output: &Pa
     let bounds = [low, high];
     let view = scene.output.solid.view();
     let solids = Solids { title: scene.title.clone(), bounds, unit: ("mm".into(), 1e-3), view, fields };
-    let outside = Outside::new(mesh, &own, scene.output.solid.plane(bounds))?.at(points);
+    let outside = PartSkin::new(mesh, &own, scene.output.solid.plane(bounds))?.with_points(points);
     let exists = stresses.iter().map(|stress| stress.is_finite()).collect();
     let state = if stress.settings().release { "released" } else { "on the bed" };
     let title = format!("{state}, displacements × {factor}");
-    let (title, skin) = outside.skin(Frame { title, values: vec![lift, mises], exists });
+    let (title, skin) = outside.skin(SolidFrame { title, values: vec![lift, mises], exists });
     solids.write(output.join("warped.png"), 1, |_| Ok((title.clone(), skin.clone())))?;
     Ok(())
 }
 
-/// 1, 2 or 5 times a power of ten, no larger; 1 where nothing moves.
-fn round(factor: f64) -> f64 {
+/// Rounds down to 1, 2 or 5 times a power of ten; 1 if nothing moves.
+fn round_down(factor: f64) -> f64 {
     if !factor.is_finite() || factor < 1.0 {
         return 1.0;
     }
@@ -77,11 +81,11 @@ fn round(factor: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::round;
+    use super::round_down;
 
     #[test]
-    fn factors_are_round() {
-        let found = [0.3, 1.0, 4.9, 18.0, 77.0, 1000.0, f64::INFINITY, f64::NAN].map(round);
+    fn factors_are_rounded() {
+        let found = [0.3, 1.0, 4.9, 18.0, 77.0, 1000.0, f64::INFINITY, f64::NAN].map(round_down);
         assert_eq!(found, [1.0, 1.0, 2.0, 10.0, 50.0, 1000.0, 1.0, 1.0]);
     }
 }

@@ -1,9 +1,9 @@
-//! What is laid down when: in layers, or along a path.
+//! Print plan of a scene: elements and their birth times, in layers or along a path.
 
-use super::fault::located;
-use super::file;
+use super::gcode_file;
+use super::locate_error::located;
 use super::part::PrintSpec;
-use super::places::{elements, millimetres};
+use super::selection::{elements, millimetres};
 use super::voxels::Filling;
 use crate::boundary::Schedule;
 use crate::error::Error;
@@ -16,7 +16,7 @@ use harness::scene::{SceneError, Source};
 use std::path::Path;
 
 impl PrintSpec {
-    /// `filling`: of a mesh of a path, which is printed along it unless layers are asked for.
+    /// Plans the print. A mesh from a path (`filling`) is printed along it, unless the scene gives layers.
     pub(super) fn plan(
         &self,
         source: &Source,
@@ -57,19 +57,20 @@ impl PrintSpec {
         self.temperature.as_ref().map(|given| given.build(source, "print.temperature")).transpose()
     }
 
-    /// Elements at their times along a path.
+    /// Plans elements with given times along a path.
     fn plan_along(&self, source: &Source, path: &ToolPath, times: &[f64]) -> Result<PrintPlan, SceneError> {
         let (window, schedule) = (self.window.map(|window| window.si()), self.schedule(source)?);
         PrintPlan::along(path, times, self.start(), window, schedule.as_ref()).map_err(|error| match error {
             Error::Parameter { name: NOZZLE, found: time, .. } => {
-                let found = format!("nothing, and no M104 or M109 in the file before {time} s");
-                source.error("print.temperature", found, "a temperature")
+                let why =
+                    format!("the file sets no nozzle temperature (M104, M109) before {time} s; write it");
+                source.missing("print.temperature", why)
             }
             other => located(source, "print.window", &other),
         })
     }
 
-    /// Along a path; what its beads do not cover is never printed.
+    /// Plans elements along a path file; elements that no bead covers are not printed.
     fn plan_along_file(
         &self,
         source: &Source,
@@ -83,14 +84,14 @@ impl PrintSpec {
         let tool = if table { read_csv(&path) } else { read_gcode(&path) };
         let mut tool = tool.map_err(|error| at("print.path", error))?;
         notes.append(&mut tool.notes);
-        let fed = file::filament(source, "print", &tool, self.filament)?;
+        let fed = gcode_file::filament(source, "print", &tool, self.filament)?;
         if !table || self.acceleration.is_some() || self.jerk.is_some() {
-            tool = file::timed(source, "print", tool, self.acceleration, self.jerk, notes)?;
+            tool = gcode_file::with_times(source, "print", tool, self.acceleration, self.jerk, notes)?;
         }
         if tool.has_feed() {
             notes.extend(tool.summary(fed));
         }
-        file::leave_out(source, "print", &self.leave_out, &mut tool, notes)?;
+        gcode_file::leave_out(source, "print", &self.leave_out, &mut tool, notes)?;
         let elements = elements(source, mesh, "print.elements", self.elements.as_deref())?;
         let bead = Bead {
             width: self.bead_width.map_or(0.0, |width| width.si()),
@@ -115,31 +116,31 @@ impl PrintSpec {
                 format!("from {low} to {high}")
             };
             let found = format!(
-                "a path {} whose beads cover no centre of an element of the part",
+                "a path {} whose beads cover no element center of the part",
                 boxed(tool.bounds(bead))
             );
             let allowed = format!(
-                "one that meets the part, which reaches {}; `centre = true` puts the path over it, `offset` anywhere",
+                "a path over the part, which reaches {} (`centre = true` centers the path, `offset` shifts it)",
                 boxed(mesh.bounds_of(&elements))
             );
             return Err(source.error("print.path", found, allowed));
         }
-        let mut told = format!(
-            "the beads cover {covered:.1} % of the part; {outside:.1} % of their length lies outside of it"
+        let mut text = format!(
+            "the beads cover {covered:.1} % of the part; {outside:.1} % of their length lies outside"
         );
         if self.fill {
             activation.fill(mesh);
-            told += &format!("; with gaps filled {:.1} % is printed", share(&activation.missed));
+            text += &format!("; with filled gaps {:.1} % are printed", share(&activation.missed));
         } else if !activation.missed.is_empty() {
-            told += "; what they do not cover is not printed (`fill = true` fills gaps)";
+            text += "; the rest is not printed (`fill = true` fills gaps)";
         }
-        notes.push(told);
-        let extruded: f64 = tool.printing_moves().map(|one| one.volume(fed)).sum();
+        notes.push(text);
+        let extruded: f64 = tool.printing_moves().map(|bead| bead.volume(fed)).sum();
         if extruded > 0.0 {
             let ratio = (whole - volume(&activation.missed)) / extruded;
             if !(RATIOS[0]..=RATIOS[1]).contains(&ratio) {
                 notes.push(format!(
-                    "what is printed has {ratio:.3} times the volume that the file extrudes: `[mesh.path]` prints what it extrudes"
+                     "the printed elements have {ratio:.3} times the extruded volume of the file (use `[mesh.path]` to print it)"
                 ));
             }
         }

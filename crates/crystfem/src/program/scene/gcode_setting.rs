@@ -1,6 +1,6 @@
-//! Values over time that a G-code file sets: its nozzle, its bed, its fan.
+//! Values over time from the settings of a G-code file: nozzle, bed or fan.
 
-use super::fault::located;
+use super::locate_error::located;
 use super::schedule::{FileSetting, ScheduleSpec, TimesSpec};
 use crate::boundary::Schedule;
 use crate::mesh::path::{Setting, ToolPath, read_gcode};
@@ -10,32 +10,33 @@ use polycore::units::{Acceleration, Dimension, Speed};
 use serde::Deserialize;
 use std::path::PathBuf;
 
-/// How long a setting of a file takes to be reached, s.
-const CHANGE: f64 = 1.0;
-/// What a bed cools towards, K, and its time constant, s: 3 mm of aluminium (7.3 kJ/(m² K)) lose 12 W/(m² K).
-const ROOM: f64 = 298.15;
-const CONSTANT: f64 = 600.0;
-/// Times of a cooling that are given, over its time constant: between them it is off by 0.2 % of the whole at
-/// most.
-const TIMES: [f64; 20] =
+/// Time in which a setting is reached, s.
+const CHANGE_TIME: f64 = 1.0;
+/// Default temperature towards which a bed cools, K, and its time constant, s: 3 mm of aluminium (7.3 kJ/(m²
+/// K)) lose 12 W/(m² K).
+const ROOM_TEMPERATURE: f64 = 298.15;
+const COOLING_TIME: f64 = 600.0;
+/// Sampled times of a cooling over its time constant: linear interpolation between them is off by at most 0.2
+/// %.
+const COOLING_SAMPLES: [f64; 20] =
     [0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.75, 0.9, 1.1, 1.3, 1.5, 1.8, 2.1, 2.5, 3.0, 3.6, 4.4, 5.5, 7.0];
-/// A bed is as cold as it gets, K.
+/// Distance from room temperature at which a bed counts as cold, K.
 const COLD: f64 = 1.0;
 
-/// What of a scene changes the times of a path.
+/// Keys of a scene that change the times of a path.
 #[derive(Deserialize)]
-struct Outline {
+struct PathOutline {
     mesh: Option<MeshOutline>,
     print: Option<PrintOutline>,
 }
 
 #[derive(Deserialize)]
 struct MeshOutline {
-    path: Option<Timed>,
+    path: Option<PathTiming>,
 }
 
 #[derive(Deserialize)]
-struct Timed {
+struct PathTiming {
     file: PathBuf,
     acceleration: Option<Acceleration>,
     jerk: Option<Speed>,
@@ -49,14 +50,14 @@ struct PrintOutline {
 }
 
 impl<D: Dimension + Copy> TimesSpec<D> {
-    /// The path of the file, with the times that the scene prints it with.
+    /// Reads the path of the file, with the times at which the scene prints it.
     fn path(&self, source: &Source, key: &str) -> Result<ToolPath, SceneError> {
         let Some(name) = &self.file else {
-            return Err(source.error(&format!("{key}.file"), "nothing", "a G-code file"));
+            return Err(source.missing(&format!("{key}.file"), "`of` needs a G-code file"));
         };
         let file = source.file(name);
         let path = read_gcode(&file).map_err(|error| located(source, &format!("{key}.file"), &error))?;
-        let outline: Outline = source.parse()?;
+        let outline: PathOutline = source.parse()?;
         let own = outline.mesh.and_then(|mesh| mesh.path).map(|own| (own.file, own.acceleration, own.jerk));
         let along = outline.print.and_then(|own| own.path.map(|file| (file, own.acceleration, own.jerk)));
         for (other, acceleration, jerk) in own.into_iter().chain(along) {
@@ -68,15 +69,18 @@ impl<D: Dimension + Copy> TimesSpec<D> {
         Ok(path.with_stated_limits())
     }
 
-    /// What a bed cools towards, K, and the time constant, s.
+    /// Returns the temperature towards which a bed cools, K, and the time constant, s.
     fn cooling(&self) -> (f64, f64) {
-        (self.cools_to.map_or(ROOM, |room| room.si()), self.cooling_time.map_or(CONSTANT, |time| time.si()))
+        (
+            self.cools_to.map_or(ROOM_TEMPERATURE, |room| room.si()),
+            self.cooling_time.map_or(COOLING_TIME, |time| time.si()),
+        )
     }
 
-    /// A setting of a G-code file over its time; each command changes it within a second, but a bed that is
-    /// switched off or set lower cools exponentially. Before the first one it has that one's value, and the
-    /// fan is off.
-    pub(super) fn of_file(
+    /// Returns a setting of a G-code file over time. Each command acts within a second, but a bed that is
+    /// switched off or set lower cools exponentially. Before the first command its value applies; the fan is
+    /// off.
+    pub(super) fn from_gcode(
         &self,
         source: &Source,
         key: &str,
@@ -86,7 +90,11 @@ impl<D: Dimension + Copy> TimesSpec<D> {
         let fault =
             |name: &str, found: &str, allowed: &str| source.error(&format!("{key}.{name}"), found, allowed);
         if self.file.is_some() && (table || self.period.is_some()) {
-            return Err(source.error(key, "a table or a sine beside `of`", "`file` and `of`"));
+            return Err(source.conflict(
+                &format!("{key}.of"),
+                "time, value, period",
+                "keep `file` and `of`, or the others",
+            ));
         }
         let path = self.path(source, key)?;
         let setting = match of {
@@ -103,15 +111,27 @@ impl<D: Dimension + Copy> TimesSpec<D> {
                 pairs.insert(0, (f64::NEG_INFINITY, low.si()));
             }
             (Setting::Fan, ..) => {
-                return Err(fault("low", "nothing", "`low` and `high`: values with the fan off and on"));
+                return Err(source.missing(
+                    &format!("{key}.low"),
+                    "a fan needs `low` and `high`: the values with the fan off and on",
+                ));
             }
             (_, None, None) if D::NAME == TemperatureDimension::NAME => {}
-            (_, None, None) => return Err(fault("of", "a temperature", "`fan` with `low` and `high`")),
-            _ => return Err(fault("low", "`low` or `high` of a temperature", "nothing")),
+            (_, None, None) => {
+                return Err(fault("of", "a temperature setting", "`fan` with `low` and `high`"));
+            }
+            _ => {
+                return Err(source.unexpected(
+                    &format!("{key}.low"),
+                    "temperatures of a file need no scale; remove `low` and `high`",
+                ));
+            }
         }
         let cooling = [("cools_to", self.cools_to.is_some()), ("cooling_time", self.cooling_time.is_some())];
         if let Some((name, _)) = cooling.iter().find(|(_, given)| *given && setting != Setting::Bed) {
-            return Err(fault(name, "cooling of no bed", "`of = \"bed\"`"));
+            return Err(
+                source.unexpected(&format!("{key}.{name}"), "it belongs to `of = \"bed\"`; remove it")
+            );
         }
         let (room, constant) = self.cooling();
         if !(constant > 0.0 && constant.is_finite()) {
@@ -122,44 +142,47 @@ impl<D: Dimension + Copy> TimesSpec<D> {
     }
 }
 
-/// Values that are reached within a second of their commands.
+/// Returns values that are reached within a second of their commands.
 fn steps(pairs: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let mut points: Vec<(f64, f64)> = Vec::new();
     for &(time, value) in pairs {
         match points.last().copied() {
-            None => points.push((time.max(-CHANGE), value)),
-            // commands within a second of one another: the last holds
+            None => points.push((time.max(-CHANGE_TIME), value)),
+            // of several commands within a second, the last one applies
             Some((last, before)) => {
-                let from = time.max(last + 1e-6 * CHANGE);
-                points.extend([(from, before), (from + CHANGE, value)]);
+                let from = time.max(last + 1e-6 * CHANGE_TIME);
+                points.extend([(from, before), (from + CHANGE_TIME, value)]);
             }
         }
     }
     points
 }
 
-/// Temperatures of a bed, K: it is heated within a second, and cools towards a room with a time constant, s,
-/// down to what it is set to; NaN is off. A file that switches it off at first has it on before.
+/// Returns the temperatures of a bed, K. It heats within a second, and cools exponentially towards room
+/// temperature down to its setting; NaN switches it off. If the file first switches it off, it was on before.
 fn bed(pairs: &[(f64, f64)], room: f64, constant: f64) -> Vec<(f64, f64)> {
     let on = pairs.iter().position(|pair| !pair.1.is_nan());
     let Some(on) = on else { return pairs.first().map_or_else(Vec::new, |_| vec![(0.0, room)]) };
-    let mut points = vec![(pairs[on].0.max(-CHANGE), pairs[on].1)];
+    let mut points = vec![(pairs[on].0.max(-CHANGE_TIME), pairs[on].1)];
     for (k, &(time, set)) in pairs.iter().enumerate().skip(on + 1) {
         let (last, now) = points[points.len() - 1];
-        let from = time.max(last + 1e-6 * CHANGE);
+        let from = time.max(last + 1e-6 * CHANGE_TIME);
         points.push((from, now));
         if set >= now {
-            points.push((from + CHANGE, set));
+            points.push((from + CHANGE_TIME, set));
             continue;
         }
         let next = pairs.get(k + 1).map_or(f64::INFINITY, |pair| pair.0);
         let at = |after: f64| room + (now - room) * (-after / constant).exp();
-        // when it is as cold as it is set; never below the room
+        // time at which it reaches its setting; never below room temperature
         let reached = if set > room { constant * ((now - room) / (set - room)).ln() } else { f64::INFINITY };
         let end = reached.min(next - from);
-        let inside = TIMES.iter().map(|share| share * constant).filter(|after| *after < end - 1e-6 * CHANGE);
+        let inside = COOLING_SAMPLES
+            .iter()
+            .map(|share| share * constant)
+            .filter(|after| *after < end - 1e-6 * CHANGE_TIME);
         points.extend(inside.map(|after| (from + after, at(after))));
-        if end.is_finite() && end > 2e-6 * CHANGE {
+        if end.is_finite() && end > 2e-6 * CHANGE_TIME {
             points.push((from + end, if reached <= next - from { set } else { at(end) }));
         }
     }
@@ -167,8 +190,8 @@ fn bed(pairs: &[(f64, f64)], room: f64, constant: f64) -> Vec<(f64, f64)> {
 }
 
 impl ScheduleSpec<TemperatureDimension> {
-    /// Of a bed that its file switches off at last: when, s, unless it is cold at `end`, s, and how hot it is
-    /// then, K.
+    /// Returns the time at which the file finally switches off its bed, s, and the temperature at `end`, K,
+    /// unless the bed is cold by then.
     pub(super) fn still_hot(
         &self,
         source: &Source,
@@ -192,8 +215,8 @@ impl ScheduleSpec<TemperatureDimension> {
 mod tests {
     use super::*;
 
-    /// Off at 10 s from 60 °C in a room of 20 °C, time constant 100 s: (60 − 20)/e after 100 s; set lower it
-    /// stops there.
+    /// A bed at 60 °C is switched off at 10 s in a room of 20 °C, time constant 100 s: 20 + (60 − 20)/e °C
+    /// after 100 s; set lower, it stops at its setting.
     #[test]
     fn beds_cool() {
         let at = |pairs: &[(f64, f64)], time: f64| {
@@ -210,7 +233,7 @@ mod tests {
         let reached = 10.0 + 100.0 * 2f64.ln();
         assert!((at(&lower, reached) - 40.0).abs() < 1e-9 && at(&lower, reached + 50.0) == 40.0);
         assert!(at(&lower, reached - 20.0) > 44.0);
-        // on again before it is cold
+        // switched on again before it is cold
         let again = [(0.0, 60.0), (10.0, f64::NAN), (110.0, 60.0)];
         assert!((at(&again, 110.0) - 34.7).abs() < 0.1 && at(&again, 112.0) == 60.0);
         assert_eq!(bed(&[(0.0, f64::NAN), (0.5, 60.0)], 20.0, 100.0), [(0.5, 60.0)]);
