@@ -10,7 +10,7 @@ use crystfem::simulation::{Settings, Simulation};
 use harness::scene::Source;
 use std::sync::Arc;
 
-const SCENE: &str = include_str!("../../../../cases/ch4/printed-bar/case.toml");
+const SCENE: &str = include_str!("../fixtures/printed_bar.toml");
 
 fn glass() -> Conductor {
     Conductor::new(2500.0, Property::Constant(1.0), Property::Constant(800.0)).unwrap()
