@@ -204,7 +204,7 @@ fn links_lead_to_files() {
 }
 
 /// Examples of the libraries are doctests of the crates, in the head of a `lib.rs`, or programs in their `examples`
-/// ([`crate::examples`] runs them).
+/// ([`crate::examples`] runs them), which the page repeats.
 #[test]
 fn rust_examples_are_doctests_or_programs() {
     let heads: Vec<String> = ["peri", "mdsurrogate"]
@@ -216,21 +216,22 @@ fn rust_examples_are_doctests_or_programs() {
             lines.filter(|line| !line.starts_with("# ")).collect::<Vec<_>>().join("\n")
         })
         .into();
-    let path = workspace().join("docs/guide/src/how-to/library.md");
-    let page = fs::read_to_string(&path).unwrap();
-    let fences: Vec<&str> =
-        page.split("```rust\n").skip(1).filter_map(|rest| rest.split("\n```").next()).collect();
+    let page = fs::read_to_string(workspace().join("docs/guide/src/how-to/library.md")).unwrap();
     let mut programs = 0;
-    for fence in &fences {
-        if let Some(file) = fence.strip_prefix("{{#include ").and_then(|rest| rest.strip_suffix("}}")) {
-            assert!(file.contains("/examples/") && path.with_file_name(file).is_file(), "{file}");
+    let parts: Vec<&str> = page.split("```rust\n").collect();
+    for (before, after) in parts.iter().zip(&parts[1..]) {
+        let fence = after.split("\n```").next().unwrap();
+        let marker = before.trim_end().lines().next_back().and_then(|line| line.strip_prefix("<!-- file: "));
+        if let Some(file) = marker.and_then(|rest| rest.strip_suffix(" -->")) {
+            let text = fs::read_to_string(workspace().join(file)).unwrap();
+            assert!(file.contains("/examples/") && text.trim_end() == fence, "{file}");
             programs += 1;
             continue;
         }
         let there = |head: &String| head.contains(&format!("```\n{fence}\n```"));
         assert!(heads.iter().any(there), "no doctest is\n{fence}");
     }
-    assert!(programs >= 4 && fences.len() > programs, "{programs} of {}", fences.len());
+    assert!(programs >= 4 && parts.len() > programs + 1, "{programs} of {}", parts.len());
 }
 
 /// What mdBook would leave out: pages that SUMMARY.md does not name.

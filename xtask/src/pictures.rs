@@ -1,4 +1,4 @@
-//! Draws the pictures and tables of README and guide from cases, and finds those whose sources have changed since.
+//! Draws the pictures and tables of README and guide from cases, copies the files that pages show, and finds what is stale.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -15,6 +15,7 @@ use crate::workspace::Workspace;
 
 mod compose;
 mod fill;
+mod include;
 
 use compose::Image;
 
@@ -154,6 +155,7 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
         stamps.insert(key.clone(), Stamp::new(root, &list.sources(root, cases)?)?);
         print(&format!("{key}\n"));
     }
+    include::update(root, &crate::tidy::tracked(root)?)?;
     let text = toml::to_string(&stamps).into_diagnostic()?;
     fs::write(root.join(STAMPS), text).into_diagnostic().wrap_err(STAMPS)?;
     print(&format!("pictures: {} drawn of {}\n", wanted.len(), list.entries().len()));
@@ -164,7 +166,7 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
 pub fn findings(root: &Path, files: &[PathBuf]) -> Result<Vec<String>> {
     let list = List::read(root)?;
     let stamps = stamps(root)?;
-    let mut findings = Vec::new();
+    let mut findings = include::findings(root, files)?;
     for (key, _) in list.entries() {
         if !stamps.get(&key).is_some_and(|stamp| stamp.fresh(root)) {
             findings.push(format!("{key}: stale; run `cargo xtask pictures`"));

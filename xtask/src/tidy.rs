@@ -78,7 +78,7 @@ fn is_source(file: &Path) -> bool {
 }
 
 /// What git knows, and what it would take in with `git add`.
-fn tracked(root: &Path) -> Result<Vec<PathBuf>> {
+pub fn tracked(root: &Path) -> Result<Vec<PathBuf>> {
     let output = Command::new("git")
         .args(["ls-files", "-z", "--cached", "--others", "--exclude-standard"])
         .current_dir(root)
