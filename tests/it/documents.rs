@@ -9,10 +9,11 @@ const PROGRAMS: [&str; 4] = ["crystfem", "mdsurrogate", "peri", "polycore"];
 
 /// A command line in a document.
 #[derive(Debug)]
-struct Shown {
+pub struct Shown {
     file: PathBuf,
     line: usize,
-    words: Vec<String>,
+    /// Program and arguments.
+    pub words: Vec<String>,
 }
 
 /// README and everything below docs.
@@ -36,7 +37,7 @@ fn documents() -> Vec<PathBuf> {
 }
 
 /// Commands in fences marked as shell, a backslash joining lines; output, comments and other languages are left out.
-fn commands_of(file: &Path) -> Vec<Shown> {
+pub fn commands_of(file: &Path) -> Vec<Shown> {
     let text = fs::read_to_string(file).unwrap();
     let (mut shown, mut shell, mut inside) = (Vec::new(), false, false);
     let mut joined = String::new();
@@ -100,7 +101,7 @@ fn parts(line: &str) -> Vec<Vec<String>> {
 }
 
 /// Which of our programs a command runs, and its arguments.
-fn ours(words: &[String]) -> Option<(&str, Vec<&str>)> {
+pub fn ours(words: &[String]) -> Option<(&str, Vec<&str>)> {
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     match words[..] {
         ["cargo", "xtask", ..] => Some(("xtask", words[2..].to_vec())),

@@ -37,7 +37,10 @@ fn shown(root: &Path, path: &str) -> Result<String> {
     let part = text.split_once(&format!("// ANCHOR: {anchor}\n"));
     let part = part.and_then(|(_, rest)| rest.split_once(&format!("// ANCHOR_END: {anchor}")));
     let (part, _) = part.ok_or_else(|| miette!("{path}: missing anchor `{anchor}`"))?;
-    Ok(part.trim_matches('\n').to_owned())
+    let lines = || part.lines().filter(|line| !line.trim().is_empty());
+    let indent = lines().map(|line| line.len() - line.trim_start().len()).min().unwrap_or(0);
+    let dedented: Vec<&str> = part.trim_end().lines().map(|line| line.get(indent..).unwrap_or_default()).collect();
+    Ok(dedented.join("\n").trim_start_matches('\n').to_owned())
 }
 
 /// Markdown files with markers, each with its text and what it should be.
@@ -88,7 +91,7 @@ mod tests {
         let page = fs::read_to_string(root.path().join("page.md")).expect("text");
         assert_eq!(page, "# Page\n\n<!-- file: a.toml -->\n```toml\nx = 1\n```\nend\n");
         assert_eq!(findings(root.path(), &files).expect("findings"), [""; 0]);
-        write("a.rs", "use b;\n// ANCHOR: main\nfn main() {}\n// ANCHOR_END: main\n");
+        write("a.rs", "use b;\n    // ANCHOR: main\n    fn main() {}\n    // ANCHOR_END: main\n");
         write("page.md", "# Page\n\n<!-- file: a.rs#main -->\n```rust\n```\n");
         update(root.path(), &files).expect("an update");
         let page = fs::read_to_string(root.path().join("page.md")).expect("text");
