@@ -9,10 +9,11 @@ const PROGRAMS: [&str; 4] = ["crystfem", "mdsurrogate", "peri", "polycore"];
 
 /// A command line in a document.
 #[derive(Debug)]
-struct Shown {
+pub struct Shown {
     file: PathBuf,
     line: usize,
-    words: Vec<String>,
+    /// Program and arguments.
+    pub words: Vec<String>,
 }
 
 /// README and everything below docs.
@@ -37,7 +38,7 @@ fn documents() -> Vec<PathBuf> {
 
 /// Collects commands in fences marked as shell; a backslash joins lines; output, comments and other languages
 /// are left out.
-fn commands_of(file: &Path) -> Vec<Shown> {
+pub fn commands_of(file: &Path) -> Vec<Shown> {
     let text = fs::read_to_string(file).unwrap();
     let (mut shown, mut shell, mut inside) = (Vec::new(), false, false);
     let mut joined = String::new();
@@ -101,7 +102,7 @@ fn parts(line: &str) -> Vec<Vec<String>> {
 }
 
 /// Returns which of our programs a command runs, and its arguments.
-fn ours(words: &[String]) -> Option<(&str, Vec<&str>)> {
+pub fn ours(words: &[String]) -> Option<(&str, Vec<&str>)> {
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     match words[..] {
         ["cargo", "xtask", ..] => Some(("xtask", words[2..].to_vec())),
@@ -205,7 +206,7 @@ fn links_lead_to_files() {
 }
 
 /// Examples of the libraries are doctests of the crates, in the head of a `lib.rs`, or programs in their
-/// `examples` ([`crate::examples`] runs them).
+/// `examples` ([`crate::examples`] runs them), which the page repeats.
 #[test]
 fn rust_examples_are_doctests_or_programs() {
     let heads: Vec<String> = ["peri", "mdsurrogate"]
@@ -217,21 +218,22 @@ fn rust_examples_are_doctests_or_programs() {
             lines.filter(|line| !line.starts_with("# ")).collect::<Vec<_>>().join("\n")
         })
         .into();
-    let path = workspace().join("docs/guide/src/how-to/library.md");
-    let page = fs::read_to_string(&path).unwrap();
-    let fences: Vec<&str> =
-        page.split("```rust\n").skip(1).filter_map(|rest| rest.split("\n```").next()).collect();
+    let page = fs::read_to_string(workspace().join("docs/guide/src/how-to/library.md")).unwrap();
     let mut programs = 0;
-    for fence in &fences {
-        if let Some(file) = fence.strip_prefix("{{#include ").and_then(|rest| rest.strip_suffix("}}")) {
-            assert!(file.contains("/examples/") && path.with_file_name(file).is_file(), "{file}");
+    let parts: Vec<&str> = page.split("```rust\n").collect();
+    for (before, after) in parts.iter().zip(&parts[1..]) {
+        let fence = after.split("\n```").next().unwrap();
+        let marker = before.trim_end().lines().next_back().and_then(|line| line.strip_prefix("<!-- file: "));
+        if let Some(file) = marker.and_then(|rest| rest.strip_suffix(" -->")) {
+            let text = fs::read_to_string(workspace().join(file)).unwrap();
+            assert!(file.contains("/examples/") && text.trim_end() == fence, "{file}");
             programs += 1;
             continue;
         }
         let there = |head: &String| head.contains(&format!("```\n{fence}\n```"));
         assert!(heads.iter().any(there), "no doctest is\n{fence}");
     }
-    assert!(programs >= 4 && fences.len() > programs, "{programs} of {}", fences.len());
+    assert!(programs >= 4 && parts.len() > programs + 1, "{programs} of {}", parts.len());
 }
 
 /// Pages that SUMMARY.md does not name are missing from the book.

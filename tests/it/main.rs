@@ -20,6 +20,7 @@
 //! * [`schemas`]: JSON Schemas, by which every case is valid;
 //! * [`view`]: pages in a [`browser`];
 //! * [`words`]: mistakes that would pass in silence, and the number of messages;
+//! * [`tutorials`]: every command of the tutorials, in their order;
 //! * [`documents`]: the commands and links that README and docs show.
 
 mod allocations;
@@ -48,5 +49,6 @@ mod rubber;
 mod scenes;
 mod schemas;
 mod slicers;
+mod tutorials;
 mod view;
 mod words;

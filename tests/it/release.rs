@@ -60,6 +60,20 @@ fn published_crates_are_complete() {
     assert_eq!(published, 8);
 }
 
+/// Tests of a published crate read copies of data, because files outside of the package are not published.
+#[test]
+fn copies_inside_packages_are_current() {
+    for (copy, original) in [
+        ("polycore/tests/data/treloar1944_uniaxial.csv", "ch1/rubber-fits/treloar1944_uniaxial.csv"),
+        ("polycore/tests/data/kawabata1981_biaxial.csv", "ch1/rubber-fits/kawabata1981_biaxial.csv"),
+        ("polycore/tests/data/treloar1944_20C.csv", "external/treloar-fits/treloar1944_20C.csv"),
+        ("crystfem/tests/fixtures/printed_bar.toml", "ch4/printed-bar/case.toml"),
+    ] {
+        let (copy, original) = (format!("crates/{copy}"), format!("cases/{original}"));
+        assert_eq!(read(&copy), read(&original), "copy {original} to {copy}");
+    }
+}
+
 /// The archive contains programs, completions, man pages and terms, in agreement with the programs.
 #[test]
 fn an_archive_for_this_system() {

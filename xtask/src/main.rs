@@ -10,6 +10,7 @@ mod bench;
 mod dist;
 mod licences;
 mod outcome;
+mod pictures;
 mod report;
 mod stamp;
 mod summary;
@@ -44,6 +45,8 @@ enum Task {
     /// Make the archive of a release for this system: programs, completions, man pages, licences of
     /// dependencies.
     Dist(dist::Options),
+    /// Draw the pictures and tables of README and guide from cases; those that are up to date are kept.
+    Pictures(pictures::Options),
     /// Check the tree: wording, lengths of source files, sizes of files in git.
     Tidy,
 }
@@ -55,6 +58,7 @@ fn main() -> ExitCode {
         Task::Validate(options) => validate::run(&workspace, &options),
         Task::Bench(options) => bench::run(&workspace, &options),
         Task::Dist(options) => dist::run(&workspace, &options),
+        Task::Pictures(options) => pictures::run(&workspace, &options),
         Task::Tidy => tidy::run(&workspace),
     };
     match passed {

@@ -63,7 +63,8 @@ pub fn sources(root: &Path, crates: &[&str], parts: &[&str]) -> Vec<String> {
     folders.chain(below).filter(|source| root.join(source).exists()).collect()
 }
 
-/// Hashes names and contents of all files, sorted by name, by FNV-1a: the same on every machine.
+/// Hashes names and contents of all files, sorted by name, by FNV-1a: the same on every machine. Lines of Rust
+/// that are blank or comments do not count.
 fn hash(root: &Path, sources: &[String]) -> std::io::Result<String> {
     let mut files = Vec::new();
     for source in sources {
@@ -79,10 +80,21 @@ fn hash(root: &Path, sources: &[String]) -> std::io::Result<String> {
     for file in files {
         take(file.strip_prefix(root).unwrap_or(&file).to_string_lossy().as_bytes());
         take(&[0]);
-        take(&fs::read(&file)?);
+        take(&content(&file)?);
         take(&[0]);
     }
     Ok(format!("{hash:016x}"))
+}
+
+/// Content of a file as far as it matters.
+fn content(file: &Path) -> std::io::Result<Vec<u8>> {
+    let bytes = fs::read(file)?;
+    if file.extension().is_none_or(|extension| extension != "rs") {
+        return Ok(bytes);
+    }
+    let is_code = |line: &&str| !line.is_empty() && !line.starts_with("//");
+    let text = String::from_utf8_lossy(&bytes);
+    Ok(text.lines().map(str::trim).filter(is_code).collect::<Vec<_>>().join("\n").into_bytes())
 }
 
 fn collect(path: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {

@@ -44,6 +44,7 @@ pub fn run(workspace: &Repository) -> Result<bool> {
     }
     findings.extend(unused_dependencies(workspace.root(), &files)?);
     findings.extend(words.findings());
+    findings.extend(crate::pictures::findings(workspace.root(), &files)?);
     for finding in &findings {
         print(&format!("{finding}\n"));
     }
@@ -84,7 +85,7 @@ fn is_source(file: &Path) -> bool {
 }
 
 /// Lists the files that git tracks or would add with `git add`.
-fn tracked(root: &Path) -> Result<Vec<PathBuf>> {
+pub fn tracked(root: &Path) -> Result<Vec<PathBuf>> {
     let output = Command::new("git")
         .args(["ls-files", "-z", "--cached", "--others", "--exclude-standard"])
         .current_dir(root)

@@ -128,7 +128,7 @@ mod tests {
         Plate::new(60.0, [500.0; 2], layer).unwrap()
     }
 
-    /// Rows of a table in docs/reference/plate.
+    /// Rows of a table that docs/reference/plate/plate_series.py wrote.
     fn table(text: &str) -> Vec<Vec<f64>> {
         let lines = text.lines().filter(|line| !line.starts_with('#')).skip(1);
         lines.map(|line| line.split(',').map(|x| x.parse().unwrap()).collect()).collect()
@@ -139,7 +139,7 @@ mod tests {
     #[test]
     fn ligament_and_peaks() {
         let layers = [0.0, 3.0, 6.0, 12.0, 15.0, 30.0];
-        let rows = table(include_str!("../../../../docs/reference/plate/plate_ligament.csv"));
+        let rows = table(include_str!("../../tests/data/plate_ligament.csv"));
         let elements = [3.12474, 3.12770, f64::NAN, 3.13642, 3.13917, 3.15280];
         for (column, (layer, element)) in layers.into_iter().zip(elements).enumerate() {
             let plate = square(layer);
@@ -166,7 +166,7 @@ mod tests {
     #[test]
     fn polar_grid() {
         let plate = square(0.0);
-        let rows = table(include_str!("../../../../docs/reference/plate/plate_polar.csv"));
+        let rows = table(include_str!("../../tests/data/plate_polar.csv"));
         assert!(rows.len() > 300);
         for row in rows {
             let (radius, angle) = (row[0], row[1].to_radians());

@@ -3,12 +3,12 @@ use crate::constitutive::hyperelastic::data::{Mode, TestState};
 use crate::constitutive::hyperelastic::{MODELS, model};
 
 fn treloar() -> TestData {
-    let text = include_str!("../../../../../cases/ch1/rubber-fits/treloar1944_uniaxial.csv");
+    let text = include_str!("../../../tests/data/treloar1944_uniaxial.csv");
     TestData::parse("treloar", text).unwrap()
 }
 
 fn kawabata() -> TestData {
-    let text = include_str!("../../../../../cases/ch1/rubber-fits/kawabata1981_biaxial.csv");
+    let text = include_str!("../../../tests/data/kawabata1981_biaxial.csv");
     TestData::parse("kawabata", text).unwrap()
 }
 
@@ -183,7 +183,7 @@ fn a_double_exponent_is_no_minimum() {
 /// least one here, 4e-18 of the whole: 0.0482 MPa.
 #[test]
 fn three_terms_on_a_bar() {
-    let text = include_str!("../../../../../cases/external/treloar-fits/treloar1944_20C.csv");
+    let text = include_str!("../../../tests/data/treloar1944_20C.csv");
     let table = TestData::parse("treloar", text).unwrap().select(Mode::Uniaxial).unwrap();
     let of = |key: &str| fit(model(key).unwrap(), &table).unwrap().rms / 1e6;
     assert!((of("ogden-2") - 0.071481).abs() < 1e-6);
