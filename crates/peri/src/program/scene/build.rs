@@ -3,7 +3,7 @@
 use super::cloud::cloud;
 use super::crack::{cracks, severed};
 use super::memory;
-use super::values::{Body, needed, ordered, vector};
+use super::values::{Body, ONE_OF_THEM, check_order, required, vector};
 use super::variant::Variant;
 use super::{Axis, Scene, ShapeKind, ShapeSpec};
 use crate::bonds::{BodyGeometry, BondDamage, LatticeBonds};
@@ -112,16 +112,12 @@ pub(super) fn outline<const D: usize>(source: &Source, scene: &Scene) -> Result<
 fn thickness(source: &Source, scene: &Scene) -> Result<f64, SceneError> {
     match (scene.body.space, scene.body.thickness) {
         (Space::Solid, None) => Ok(1.0),
-        (Space::Solid, Some(_)) => Err(source.error(
-            "body.thickness",
-            "a thickness",
-            "none: the body is `solid`, its size is in its shapes",
-        )),
+        (Space::Solid, Some(_)) => {
+            Err(source.unexpected("body.thickness", "a `solid` takes its size from its shapes"))
+        }
         (_, Some(t)) if t.si() > 0.0 => Ok(t.si()),
         (_, Some(t)) => Err(source.error("body.thickness", format!("{} m", t.si()), "above 0")),
-        (_, None) => {
-            Err(source.error("body.thickness", "nothing", "a length; a plane body needs its thickness"))
-        }
+        (_, None) => Err(source.missing("body.thickness", "needed for a plane body")),
     }
 }
 
@@ -162,9 +158,9 @@ pub(super) fn operations<const D: usize>(
         match (spec.add, spec.cut) {
             (Some(kind), None) => Ok(Operation::Add(shape(source, &key, kind, spec)?)),
             (None, Some(kind)) => Ok(Operation::Cut(shape(source, &key, kind, spec)?)),
-            (Some(_), Some(_)) => Err(source.error(&key, "both `add` and `cut`", "one of them")),
+            (Some(_), Some(_)) => Err(source.conflict(&format!("{key}.add"), "cut", ONE_OF_THEM)),
             (None, None) => {
-                Err(source.error(&key, "neither `add` nor `cut`", "one of them, with the kind of shape"))
+                Err(source.missing(&format!("{key}.add"), "needed for a shape: `add` or `cut` with its kind"))
             }
         }
     });
@@ -188,19 +184,15 @@ pub(super) fn shape<const D: usize>(
     for (name, is_given, belongs) in given {
         let path = format!("{key}.{name}");
         if is_given && !belongs {
-            return Err(source.error(
-                &path,
-                format!("`{name}`"),
-                format!("nothing: a {kind:?} has no {name}"),
-            ));
+            return Err(source.unexpected(&path, format!("a {} has no {name}", kind.name())));
         }
         if belongs && !is_given {
-            return Err(source.error(&path, "nothing", format!("a {kind:?} needs its `{name}`")));
+            return Err(source.missing(&path, format!("needed for a {}", kind.name())));
         }
     }
     let positive = |name: &str, value: Option<Length>| {
         let path = format!("{key}.{name}");
-        let value = needed(source, &path, value, "a length")?.si();
+        let value = required(source, &path, value, "needed for its size")?.si();
         if value > 0.0 { Ok(value) } else { Err(source.error(&path, format!("{value} m"), "above 0")) }
     };
     let point = |name: &str, value: &Option<Vec<Length>>| {
@@ -210,7 +202,7 @@ pub(super) fn shape<const D: usize>(
     match kind {
         ShapeKind::Box => {
             let (min, max) = (point("min", &spec.min)?, point("max", &spec.max)?);
-            ordered(source, key, min, max)?;
+            check_order(source, key, min, max)?;
             Ok(Shape::Box { min, max })
         }
         ShapeKind::Disk | ShapeKind::Ball => {
@@ -220,7 +212,7 @@ pub(super) fn shape<const D: usize>(
                 } else {
                     "`ball`, `cylinder` or `box` in a solid"
                 };
-                return Err(source.error(key, format!("a {kind:?}"), allowed));
+                return Err(source.error(key, format!("a {}", kind.name()), allowed));
             }
             Ok(Shape::Ball {
                 centre: point("centre", &spec.centre)?,
@@ -229,9 +221,9 @@ pub(super) fn shape<const D: usize>(
         }
         ShapeKind::Cylinder => {
             if D != 3 {
-                return Err(source.error(key, "a Cylinder", "`disk` or `box` in a plane body"));
+                return Err(source.error(key, "a cylinder", "`disk` or `box` in a plane body"));
             }
-            let axis = match needed(source, &format!("{key}.axis"), spec.axis, "an axis")? {
+            let axis = match required(source, &format!("{key}.axis"), spec.axis, "needed for a cylinder")? {
                 Axis::X => 0,
                 Axis::Y => 1,
                 Axis::Z => 2,

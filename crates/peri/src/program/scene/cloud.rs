@@ -3,7 +3,7 @@
 use super::GridSpec;
 use super::Scene;
 use super::memory;
-use super::values::{Body, LARGEST_RATIO, needed, ordered, positive, vector};
+use super::values::{Body, LARGEST_RATIO, check_order, positive, required, vector};
 use super::variant::Variant;
 use crate::bonds::{BodyGeometry, BondDamage, CloudBonds, LatticeBonds};
 use crate::geometry::{Cut, Gaps, recognise};
@@ -29,7 +29,7 @@ pub fn cloud<const D: usize>(
     cuts: &[Cut<D>],
 ) -> Result<Body<D>, SceneError> {
     let horizon =
-        needed(source, "body.horizon", scene.body.horizon, "a length; a cloud needs its `horizon`")?.si();
+        required(source, "body.horizon", scene.body.horizon, "needed for a cloud of points")?.si();
     positive(source, "body.horizon", horizon, "m")?;
     let (positions, volumes, key) = match (&scene.body.points, &scene.body.grid) {
         (Some(points), _) => {
@@ -41,7 +41,7 @@ pub fn cloud<const D: usize>(
             let (positions, volumes) = grid(source, spec, thickness)?;
             (positions, volumes, "body.grid")
         }
-        (None, None) => return Err(source.error("body.points", "nothing", "`points` or a `grid`")),
+        (None, None) => return Err(source.missing("body.points", "needed for a cloud: `points` or a `grid`")),
     };
     if let Some(body) = regular(&positions, &volumes, thickness, horizon, (scene, variant), cuts) {
         memory::refuse_too_large(source, scene, key, &*body.bonds)?;
@@ -113,7 +113,7 @@ fn regular<const D: usize>(
 fn grid<const D: usize>(source: &Source, spec: &GridSpec, thickness: f64) -> Result<Points<D>, SceneError> {
     let min: [f64; D] = vector(source, "body.grid.min", &spec.min)?;
     let max: [f64; D] = vector(source, "body.grid.max", &spec.max)?;
-    ordered(source, "body.grid", min, max)?;
+    check_order(source, "body.grid", min, max)?;
     let cells = <[usize; D]>::try_from(spec.cells.as_slice()).map_err(|_| {
         source.error("body.grid.cells", format!("{} numbers", spec.cells.len()), format!("{D} numbers"))
     })?;

@@ -240,9 +240,8 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     stiff("contact.stiffness", contact.pair_stiffness())?;
     stiff("contact.short_range", contact.short_range.unwrap_or(0.0))?;
     if contact.short_range.is_some() && contact.stiffness.is_some() {
-        let allowed =
-            "one of them: `stiffness` follows the material, `short_range` is the κ of the literature";
-        return Err(source.error("contact.short_range", "`short_range` beside `stiffness`", allowed));
+        let why = "`stiffness` follows the material, `short_range` is the κ of the literature";
+        return Err(source.conflict("contact.short_range", "stiffness", why));
     }
     rough("contact.friction", contact.friction)?;
     for (index, plane) in contact.plane.iter().enumerate() {
@@ -255,8 +254,11 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             return Err(source.error(&key("name"), format!("`{name}` twice"), "different names"));
         }
         if plane.velocity.is_some() && !explicit {
-            let allowed = "`displacement`, or `solver.method = \"verlet\"`";
-            return Err(source.error(&key("velocity"), "`velocity` of a quasi-static method", allowed));
+            let why = format!(
+                "needs `solver.method = \"verlet\"`; with `{}` write `displacement`",
+                scene.method().name()
+            );
+            return Err(source.unexpected(&key("velocity"), why));
         }
     }
     if scene.body.space == Space::Solid {

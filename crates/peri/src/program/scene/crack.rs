@@ -22,8 +22,8 @@ pub(super) fn cracks<const D: usize>(source: &Source, scene: &Scene) -> Result<V
                 vector::<D>(source, &key("and"), and)?;
             }
             (None, 2) => {}
-            (Some(_), _) => return Err(source.error(&key("and"), "a third corner", "none in a plane body")),
-            (None, _) => return Err(source.error(&key("and"), "nothing", "a third corner in a solid")),
+            (Some(_), _) => return Err(source.unexpected(&key("and"), "a crack of a plane body has two corners")),
+            (None, _) => return Err(source.missing(&key("and"), "needed in a solid: the third corner of the crack")),
         }
         if edges.iter().take(D - 1).any(|e| e.iter().all(|&x| x == 0.0)) {
             return Err(source.error(&key("to"), "the same point as `from`", "another point"));

@@ -161,8 +161,8 @@ impl FieldSpec {
             1 => self.table(source, key, kind, &array)?,
             _ if self.table.is_empty() => Vec::new(),
             _ => {
-                let allowed = "none: the strain that this stress belongs to follows from Young's modulus";
-                return Err(source.error(&format!("{key}.table"), "a table of a tensor", allowed));
+                let why = "the strain of a stress tensor follows from Young's modulus";
+                return Err(source.unexpected(&format!("{key}.table"), why));
             }
         };
         let boxes = self.boxes(source, &format!("{key}.placement"), body, &mesh.points)?;
@@ -348,13 +348,12 @@ impl FieldSpec {
         let origin = placement.origin.map_or([0.0; 3], |origin| origin.map(|x| x.si()));
         let mut whole = Cuboid::around(points);
         if let Some(depth) = placement.depth {
-            if D == 3 || depth[0].si() >= depth[1].si() {
-                let found = if D == 3 { "a depth of a solid" } else { "a depth that does not increase" };
-                return Err(source.error(
-                    &format!("{key}.depth"),
-                    found,
-                    "of plane bodies: [from, to] in the mesh",
-                ));
+            if D == 3 {
+                return Err(source.unexpected(&format!("{key}.depth"), "a solid has its own depth"));
+            }
+            if depth[0].si() >= depth[1].si() {
+                let found = format!("{} m to {} m", depth[0].si(), depth[1].si());
+                return Err(source.error(&format!("{key}.depth"), found, "[from, to], from < to, in the mesh"));
             }
             if let Some(across) = (0..3).find(|d| axes.iter().all(|(axis, _)| axis != d)) {
                 (whole.min[across], whole.max[across]) = (depth[0].si(), depth[1].si());

@@ -2,7 +2,7 @@
 
 use super::formula::Formula;
 use super::region::region;
-use super::values::Body;
+use super::values::{Body, ONE_OF_THEM};
 use super::{Boundary, ContactSpec, Method, Prescribed, PrescribedField, Scene, Side};
 use crate::field::Field;
 use crate::material::{Tensor, surface_load};
@@ -304,11 +304,7 @@ fn support<const D: usize>(
         }
     };
     let either = |name: &str, both: bool, other: &str| match both {
-        true => Err(source.error(
-            &format!("{key}.{name}"),
-            format!("`{name}` together with `{other}`"),
-            "one of them",
-        )),
+        true => Err(source.conflict(&format!("{key}.{name}"), other, ONE_OF_THEM)),
         false => Ok(()),
     };
     let of_place = |name: &str, formula: &Formula| match formula.other_than(&"xyz"[..D]) {
@@ -322,8 +318,8 @@ fn support<const D: usize>(
     if let Some(traction) = &boundary.traction {
         count("traction", traction.len())?;
         if boundary.side.is_none() {
-            let allowed = "`side`, or `force` on the box";
-            return Err(source.error(&format!("{key}.traction"), "a traction on a box", allowed));
+            let why = "needs a `side`; a box takes `force`";
+            return Err(source.unexpected(&format!("{key}.traction"), why));
         }
         if let Some(depth) = depth {
             support.body_force = std::array::from_fn(|d| traction[d].si() / depth);
@@ -370,10 +366,10 @@ fn support<const D: usize>(
         }
     }
     if boundary.traction.is_none() && boundary.force.is_none() && !boundary.holds() && !boundary.moves() {
-        return Err(source.error(
-            key,
-            "a region without a condition",
-            "`traction`, `force`, `displacement`, `rotation` or, in explicit dynamics, `velocity`",
+        return Err(source.missing(
+            &format!("{key}.displacement"),
+            "needed for a boundary: `displacement`, `rotation`, `traction`, `force` or, in explicit dynamics, \
+             `velocity`",
         ));
     }
     Ok(support)

@@ -211,6 +211,18 @@ pub enum ShapeKind {
     Cylinder,
 }
 
+impl ShapeKind {
+    /// Name in scenes.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Box => "box",
+            Self::Disk => "disk",
+            Self::Ball => "ball",
+            Self::Cylinder => "cylinder",
+        }
+    }
+}
+
 /// A coordinate axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]

@@ -198,12 +198,11 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             ("threshold", probe.threshold.is_some(), track == Track::Front, false),
         ] {
             if given && !belongs {
-                let found = format!("`{name}` of a probe of `{}`", name_of(track));
-                return Err(source.error(&key(name), found, "nothing"));
+                let why = format!("a probe of `{}` does not use it", name_of(track));
+                return Err(source.unexpected(&key(name), why));
             }
             if needed && !given {
-                let allowed = format!("a probe of `{}` needs `{name}`", name_of(track));
-                return Err(source.error(&key(name), "nothing", allowed));
+                return Err(source.missing(&key(name), format!("needed for a probe of `{}`", name_of(track))));
             }
         }
         for (name, axis) in [("axis", probe.axis), ("across", probe.across)] {
@@ -216,8 +215,7 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             return Err(source.error(&key("axis"), "an axis in the plane", "`z` in a plane body"));
         }
         if of_crack && scene.material.critical.is_none() {
-            let allowed = "nothing, or `material.critical`: without it nothing breaks";
-            return Err(source.error(&key("track"), "`crack`", allowed));
+            return Err(source.unexpected(&key("track"), "`crack` needs `material.critical`, so that bonds break"));
         }
         if of_j && (dimension == 3 || scene.material.solid.is_none()) {
             let found = if dimension == 3 {

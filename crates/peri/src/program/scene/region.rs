@@ -2,7 +2,7 @@
 
 use super::Boundary;
 use super::build::operations;
-use super::values::{Body, ordered, vector};
+use super::values::{Body, ONE_OF_THEM, check_order, vector};
 use crate::bonds::Bonds;
 use crate::geometry::inside;
 use harness::scene::{SceneError, Source};
@@ -32,11 +32,7 @@ pub(super) fn region<const D: usize>(
             }
             let name = boundary.depth_key().unwrap_or("layers");
             if boundary.depth.is_some() && boundary.layers.is_some() {
-                return Err(source.error(
-                    &format!("{key}.depth"),
-                    "`depth` together with `layers`",
-                    "one of them",
-                ));
+                return Err(source.conflict(&format!("{key}.depth"), "layers", ONE_OF_THEM));
             }
             if boundary.layers == Some(0) {
                 return Err(source.error(&format!("{key}.layers"), 0, "at least 1"));
@@ -71,15 +67,11 @@ pub(super) fn region<const D: usize>(
         }
         (None, Some(min), Some(max)) if boundary.shapes.is_empty() => {
             if let Some(name) = boundary.depth_key() {
-                return Err(source.error(
-                    &format!("{key}.{name}"),
-                    format!("`{name}`"),
-                    "nothing: the box has its own depth",
-                ));
+                return Err(source.unexpected(&format!("{key}.{name}"), "a box has its own depth"));
             }
             let (min, max) =
                 (vector(source, &format!("{key}.min"), min)?, vector(source, &format!("{key}.max"), max)?);
-            ordered(source, key, min, max)?;
+            check_order(source, key, min, max)?;
             (min, max, None)
         }
         (None, None, None) if !boundary.shapes.is_empty() && boundary.depth_key().is_none() => {

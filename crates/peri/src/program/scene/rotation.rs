@@ -2,7 +2,7 @@
 
 use super::boundary::RotationSpec;
 use super::region::region;
-use super::values::{Body, plain, vector};
+use super::values::{Body, ONE_OF_THEM, plain, vector};
 use super::{Boundary, Prescribed, PrescribedField, Scene};
 use crate::bonds::Bonds;
 use crate::solver::{Loads, Rotation, Support, Turned};
@@ -37,25 +37,18 @@ pub(super) fn rotation_of<const D: usize>(
             three.map(|x| x / size)
         }
         (None, _) => {
-            return Err(source.error(
-                &format!("{key}.axis"),
-                "nothing",
-                "the direction of the axis, e.g. [0, 0, 1]",
-            ));
+            let why = "needed in a solid: the direction of the axis, e.g. [0, 0, 1]";
+            return Err(source.missing(&format!("{key}.axis"), why));
         }
         (Some(_), _) => {
-            return Err(source.error(
-                &format!("{key}.axis"),
-                "an axis",
-                "none: a plane body turns in its plane",
-            ));
+            return Err(source.unexpected(&format!("{key}.axis"), "a plane body turns in its plane"));
         }
     };
     if angle.si() == 0.0 {
         return Err(source.error(&format!("{key}.angle"), "0", "an angle other than 0"));
     }
     if boundary.displacement_field.is_some() {
-        return Err(source.error(&key, "`rotation` together with `displacement_field`", "one of them"));
+        return Err(source.conflict(&key, "displacement_field", ONE_OF_THEM));
     }
     let moved = boundary.displacement.iter().flatten().enumerate();
     for (d, _) in moved.filter(|(_, component)| **component == Prescribed::Free) {

@@ -89,15 +89,11 @@ impl SolidLaw {
             ("stabilisation", self.stabilisation.is_some(), false),
         ] {
             if given && of_chains != chains {
-                let allowed = format!("nothing: it belongs to `{other}`");
-                return Err(source.error(
-                    &format!("{KEY}.{key}"),
-                    format!("`{key}` of `{}`", self.law.name()),
-                    allowed,
-                ));
+                let why = format!("`{}` does not use it, `{other}` does", self.law.name());
+                return Err(source.unexpected(&format!("{KEY}.{key}"), why));
             }
         }
-        let missing = |key: &str, what: &str| source.error(&format!("{KEY}.{key}"), "nothing", what);
+        let missing = |key: &str, why: &str| source.missing(&format!("{KEY}.{key}"), why);
         let wrong = |error: Error| match error {
             Error::Parameter { name, found, allowed } if chains || name == "stabilisation" => {
                 source.error(&format!("{KEY}.{}", name.replace(' ', "_")), plain(found), allowed)
@@ -108,16 +104,14 @@ impl SolidLaw {
             other => source.error(KEY, other, "a law with an energy, and without stress at rest"),
         };
         if chains {
-            let shear = self.shear_modulus.ok_or_else(|| missing("shear_modulus", "a stress"))?;
-            let links = self.links.ok_or_else(|| missing("links", "a number above 1"))?;
+            let shear = self.shear_modulus.ok_or_else(|| missing("shear_modulus", "needed for `eight-chain`: a stress"))?;
+            let links = self.links.ok_or_else(|| missing("links", "needed for `eight-chain`: a number above 1"))?;
             let bulk = match self.bulk_modulus {
                 Some(bulk) => bulk.si(),
                 None if space == Space::PlaneStress => f64::INFINITY,
                 None => {
-                    return Err(missing(
-                        "bulk_modulus",
-                        "a stress; only plane stress is incompressible without it",
-                    ));
+                    let why = "needed for `eight-chain`; only in plane stress is the default incompressible";
+                    return Err(missing("bulk_modulus", why));
                 }
             };
             let network = EightChain::new(space, shear.si(), links, bulk).map_err(wrong)?;
@@ -133,7 +127,8 @@ impl SolidLaw {
             return Ok(Arc::new(network.filtered().map_err(wrong)?));
         }
         let spec = self.constitutive.as_ref().ok_or_else(|| {
-            missing("constitutive", "a block with `model`, `parameters`, `bulk_modulus`, or `learnt`")
+            let why = "needed for `correspondence`: `model`, `parameters` and `bulk_modulus`, or `learnt`";
+            missing("constitutive", why)
         })?;
         let (key, stabilisation) = (format!("{KEY}.constitutive"), self.stabilisation.unwrap_or(1.0));
         let Some(learnt) = spec.learnt(source, &key)? else {
@@ -171,20 +166,20 @@ pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<
         ("fields", !material.fields.is_empty()),
     ] {
         if given {
-            let found = format!("`{key}` of bond laws together with `solid`");
-            return Err(source.error(&format!("material.{key}"), found, "one of them"));
+            let why = format!("`{key}` belongs to bond laws");
+            return Err(source.conflict(&format!("material.{key}"), "solid", why));
         }
     }
     if let Some(critical) = &material.critical {
         if critical.convention.is_some() {
-            let allowed = "nothing: the fracture energy of a `solid` is always that of tearing";
-            return Err(source.error("material.critical.convention", "a convention of bond laws", allowed));
+            let why = "a convention of bond laws; a `solid` always takes its `fracture_energy` by tearing";
+            return Err(source.unexpected("material.critical.convention", why));
         }
         if let Some(strength) = critical.strength {
             let key = "material.critical.strength";
             positive(source, key, strength.si(), "Pa")?;
             if critical.fracture_energy.is_none() {
-                return Err(source.error(key, "a strength without `fracture_energy`", "both of them"));
+                return Err(source.unexpected(key, "needs `fracture_energy` beside it"));
             }
         }
         let allowed = "either `stretch`, above 1, or `fracture_energy`, above 0";

@@ -35,8 +35,7 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         let Some(convention) = critical.convention else { continue };
         let key = format!("{key}.convention");
         if critical.fracture_energy.is_none() {
-            let found = format!("`{}` without `fracture_energy`", convention.name());
-            return Err(source.error(&key, found, "a `fracture_energy` beside it"));
+            return Err(source.unexpected(&key, "needs `fracture_energy` beside it"));
         }
         let soft = convention == Convention::Softening;
         if soft != scene.softens() {

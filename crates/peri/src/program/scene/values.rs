@@ -9,6 +9,9 @@ use polycore::units::Length;
 /// Largest horizon ratio: a stencil beyond it has more bonds than any use.
 pub const LARGEST_RATIO: f64 = 20.0;
 
+/// Advice for two keys that exclude each other.
+pub(super) const ONE_OF_THEM: &str = "write one of them";
+
 /// A discretised body.
 pub struct Body<const D: usize> {
     /// Its bonds.
@@ -77,8 +80,8 @@ pub(super) fn vector<const D: usize>(
         .map_err(|_| source.error(key, format!("{} components", value.len()), format!("{D} components")))
 }
 
-/// The corners of a box must span one.
-pub(super) fn ordered<const D: usize>(
+/// Refuses a box whose lower corner is not below its upper one.
+pub(super) fn check_order<const D: usize>(
     source: &Source,
     key: &str,
     min: [f64; D],
@@ -93,11 +96,12 @@ pub(super) fn ordered<const D: usize>(
     }
 }
 
-pub(super) fn needed<T: Copy>(
+/// Returns a value that must be written; `why` says what needs it.
+pub(super) fn required<T: Copy>(
     source: &Source,
     key: &str,
     value: Option<T>,
-    what: &str,
+    why: &str,
 ) -> Result<T, SceneError> {
-    value.ok_or_else(|| source.error(key, "nothing", what))
+    value.ok_or_else(|| source.missing(key, why))
 }
