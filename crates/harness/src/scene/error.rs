@@ -180,13 +180,7 @@ impl SceneError {
         Self::at(source, "scene::unexpected_key", Some(key), span, message).label("remove this")
     }
 
-    pub(super) fn conflict(
-        source: &Source,
-        key: String,
-        span: Range<usize>,
-        other: &str,
-        why: &str,
-    ) -> Self {
+    pub(super) fn conflict(source: &Source, key: String, span: Range<usize>, other: &str, why: &str) -> Self {
         let message = format!("`{key}` conflicts with `{other}`: {why}");
         Self::at(source, "scene::conflict", Some(key), span, message).label("here")
     }

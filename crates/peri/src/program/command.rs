@@ -13,24 +13,24 @@ mod exact;
 enum Command {
     /// Print closed-form solutions and the constants of a bond law.
     #[command(subcommand)]
-    Exact(exact::Exact),
+    ExactCommand(exact::ExactCommand),
     /// Write a scene for another engine.
     #[command(subcommand)]
-    Export(bridge::Export),
+    ExportCommand(bridge::ExportCommand),
     /// Read the results of another engine.
     #[command(subcommand)]
-    Import(bridge::Import),
-    /// Compare an export with the engine that it is for.
+    ImportCommand(bridge::ImportCommand),
+    /// CompareCommand an export with the engine that it is for.
     #[command(subcommand)]
-    Compare(bridge::Compare),
+    CompareCommand(bridge::CompareCommand),
 }
 
 /// Runs the command line of this process.
 pub fn main() -> ExitCode {
     harness::case::main::<Peri, _>(|command| match command {
-        Command::Exact(exact) => exact.print(),
-        Command::Export(export) => export.print(),
-        Command::Import(import) => import.print(),
-        Command::Compare(compare) => compare.print(),
+        Command::ExactCommand(exact) => exact.print(),
+        Command::ExportCommand(export) => export.print(),
+        Command::ImportCommand(import) => import.print(),
+        Command::CompareCommand(compare) => compare.print(),
     })
 }

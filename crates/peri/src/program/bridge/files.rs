@@ -1,6 +1,6 @@
 //! The files of an export. Lengths in mm, forces in N: LAMMPS has thresholds of its own near 1.
 
-use super::{BondType, Model};
+use super::{BondType, LammpsModel};
 use crate::Error;
 use crate::potential::BondPotential;
 use crate::program::scene::{Scene, region_names};
@@ -19,7 +19,7 @@ const MM: f64 = 1e3;
 
 /// Writes everything.
 pub(super) fn write<const D: usize>(
-    model: &Model<D>,
+    model: &LammpsModel<D>,
     scene: &Scene,
     loads: &Loads<D>,
     [text_of_scene, variant]: [&str; 2],
@@ -72,7 +72,7 @@ impl Continued<'_> {
     }
 }
 
-impl<const D: usize> Model<'_, D> {
+impl<const D: usize> LammpsModel<'_, D> {
     /// The longest stretch of the tables: the shortest bond across the widest gap; without breaking, several times the mean stretch.
     pub(super) fn longest(&self) -> f64 {
         match self.critical {

@@ -1,7 +1,7 @@
 //! Results of LAMMPS as those of a run of ours: report, history, curve, fields.
 
 use crate::program::quantities as q;
-use crate::program::run::Failure;
+use crate::program::run::PeriFailure;
 use crate::program::scene::{NAMING, Scene};
 use harness::output::csv;
 use harness::output::picture::{LinePlot, Series};
@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 
 /// What an export says of itself, as far as it is needed here.
 #[derive(serde::Deserialize)]
-struct Model {
+struct ExportHeader {
     format: String,
     variant: String,
     critical_stretch: Option<f64>,
@@ -31,9 +31,9 @@ const NAMES: [(&str, &str); 3] =
 ///
 /// # Errors
 /// A folder that is no export or without steps, a file that is cut off, results that cannot be written.
-pub fn import(folder: &Path, output: &Path) -> Result<Report, Failure> {
+pub fn import(folder: &Path, output: &Path) -> Result<Report, PeriFailure> {
     let path = folder.join("model.json");
-    let model: Model = serde_json::from_str(&read_to_string(&path).map_err(Error::io("read", &path))?)
+    let model: ExportHeader = serde_json::from_str(&read_to_string(&path).map_err(Error::io("read", &path))?)
         .map_err(|error| fault(&path, "model of an export", error.to_string()))?;
     if model.format != "peri-lammps 1" {
         return Err(fault(&path, "model of an export", format!("its format is `{}`", model.format)).into());
@@ -143,9 +143,9 @@ fn numbers(path: &Path, line: &str, between: char) -> Result<Vec<f64>, Error> {
 }
 
 /// Reference places, m, and the ends of all bonds, from 0.
-type Body = (Vec<[f64; 3]>, Vec<[usize; 2]>);
+type ReferenceBody = (Vec<[f64; 3]>, Vec<[usize; 2]>);
 
-fn read_body(path: &Path) -> Result<Body, Error> {
+fn read_body(path: &Path) -> Result<ReferenceBody, Error> {
     let text = read_to_string(path).map_err(Error::io("read", path))?;
     let section = |name: &'static str| {
         let mut lines = text.lines().skip_while(move |line| !line.starts_with(name));

@@ -15,8 +15,8 @@ use crate::bonds::Bonds;
 use crate::calibrate::Space;
 use crate::potential::BondPotential;
 use crate::program::observe::{self, Physics, SceneMaterial};
-use crate::program::run::Failure;
-use crate::program::scene::{self, Scene, Variant};
+use crate::program::run::PeriFailure;
+use crate::program::scene::{self, Scene, SceneVariant};
 use crate::solver::{Criterion, Loads};
 use harness::scene::Source;
 use std::path::Path;
@@ -26,10 +26,10 @@ use std::path::Path;
 ///
 /// # Errors
 /// A [`harness::scene::SceneError`] for what tables cannot represent; files that cannot be written.
-pub fn export(source: &Source, variant: Option<&str>, output: &Path) -> Result<Summary, Failure> {
+pub fn export(source: &Source, variant: Option<&str>, output: &Path) -> Result<Summary, PeriFailure> {
     let scene: Scene = source.parse()?;
     let variants = observe::check(source, &scene, false)?;
-    let names: Vec<String> = variants.iter().map(Variant::name).collect();
+    let names: Vec<String> = variants.iter().map(SceneVariant::name).collect();
     let index = match variant {
         None if variants.len() == 1 => 0,
         None => {
@@ -74,10 +74,10 @@ const MOST_CLAMPS: usize = 28;
 fn write<const D: usize>(
     source: &Source,
     scene: &Scene,
-    variant: &Variant,
+    variant: &SceneVariant,
     texts: [&str; 2],
     output: &Path,
-) -> Result<Summary, Failure> {
+) -> Result<Summary, PeriFailure> {
     let (body, physics) = Physics::<D>::new(source, scene, variant)?;
     let SceneMaterial::Bonds(material) = &physics.body.material else {
         // nothing else is left after `refuse`
@@ -87,7 +87,7 @@ fn write<const D: usize>(
         Some(Criterion::Stretch(stretch)) => Some(stretch.least()),
         _ => None,
     };
-    let model = Model::new(&*body.bonds, material.law(), material.modulus(), critical, &physics.loads);
+    let model = LammpsModel::new(&*body.bonds, material.law(), material.modulus(), critical, &physics.loads);
     if model.clamps.len() > MOST_CLAMPS {
         let found = format!("{} kinds of clamps, overlaps counted", model.clamps.len());
         return Err(source
@@ -120,7 +120,7 @@ pub(crate) struct Clamp<const D: usize> {
 }
 
 /// A body as LAMMPS sees it.
-pub(crate) struct Model<'a, const D: usize> {
+pub(crate) struct LammpsModel<'a, const D: usize> {
     law: &'a dyn BondPotential,
     critical: Option<f64>,
     positions: Vec<[f64; D]>,
@@ -139,7 +139,7 @@ pub(crate) struct Model<'a, const D: usize> {
     predictor: [[f64; 4]; D],
 }
 
-impl<'a, const D: usize> Model<'a, D> {
+impl<'a, const D: usize> LammpsModel<'a, D> {
     pub(crate) fn new(
         bonds: &dyn Bonds<D>,
         law: &'a dyn BondPotential,

@@ -1,7 +1,7 @@
 //! `peri export` and `peri compare`: other engines.
 
 use crate::program::bridge::{self, BOUND};
-use crate::program::run::Failure;
+use crate::program::run::PeriFailure;
 use clap::Subcommand;
 use harness::case::terminal::default_output;
 use harness::scene::Source;
@@ -9,7 +9,7 @@ use std::path::PathBuf;
 
 /// What to export to.
 #[derive(Subcommand)]
-pub enum Export {
+pub enum ExportCommand {
     /// Write data, bond tables, input, driver and self-check state of a bond law on a lattice.
     Lammps {
         /// The scene (TOML).
@@ -23,9 +23,9 @@ pub enum Export {
     },
 }
 
-impl Export {
+impl ExportCommand {
     /// Writes it.
-    pub fn print(self) -> Result<bool, Failure> {
+    pub fn print(self) -> Result<bool, PeriFailure> {
         let Self::Lammps { scene, output, variant } = self;
         let source = Source::read(&scene)?;
         let output = output.unwrap_or_else(|| {
@@ -47,7 +47,7 @@ impl Export {
 
 /// What to import from.
 #[derive(Subcommand)]
-pub enum Import {
+pub enum ImportCommand {
     /// Read what `drive.py` has written: report, history, curve, fields; judge the scene's expectations.
     Lammps {
         /// The folder that `peri export lammps` has written and `drive.py` has run in.
@@ -58,9 +58,9 @@ pub enum Import {
     },
 }
 
-impl Import {
+impl ImportCommand {
     /// Reads and judges it.
-    pub fn print(self) -> Result<bool, Failure> {
+    pub fn print(self) -> Result<bool, PeriFailure> {
         let Self::Lammps { folder, output } = self;
         let output = output.unwrap_or_else(|| folder.join("results"));
         let report = bridge::import(&folder, &output)?;
@@ -71,7 +71,7 @@ impl Import {
 
 /// What to compare with.
 #[derive(Subcommand)]
-pub enum Compare {
+pub enum CompareCommand {
     /// Run the self-check state of an export in LAMMPS; exit code 1 where forces differ.
     Lammps {
         /// The folder that `peri export lammps` has written.
@@ -82,9 +82,9 @@ pub enum Compare {
     },
 }
 
-impl Compare {
+impl CompareCommand {
     /// Runs and judges it.
-    pub fn print(self) -> Result<bool, Failure> {
+    pub fn print(self) -> Result<bool, PeriFailure> {
         let Self::Lammps { folder, python } = self;
         let python = python.or_else(|| std::env::var_os("PERI_LAMMPS_PYTHON").map(PathBuf::from));
         let python = python.unwrap_or_else(|| "python3".into());

@@ -2,13 +2,13 @@
 
 use crate::critical::Interpretation;
 use crate::potential::{Chain, KernelFit, Law};
-use crate::program::run::Failure;
+use crate::program::run::PeriFailure;
 use crate::{calibrate, exact};
 use clap::Subcommand;
 
 /// What to print.
 #[derive(Subcommand)]
-pub enum Exact {
+pub enum ExactCommand {
     /// Kirsch's stresses along x = 0 above a hole of radius 1 under unit tension, and the finite-width peak.
     Kirsch {
         /// Hole diameter over plate width.
@@ -41,9 +41,9 @@ pub enum Exact {
 /// Far beyond any rubber.
 const LARGEST_STRETCH: f64 = 1000.0;
 
-impl Exact {
+impl ExactCommand {
     /// Prints it.
-    pub fn print(self) -> Result<bool, Failure> {
+    pub fn print(self) -> Result<bool, PeriFailure> {
         match self {
             Self::Kirsch { width_ratio } => {
                 if !(0.0..1.0).contains(&width_ratio) {
@@ -111,7 +111,7 @@ impl Exact {
     }
 }
 
-fn print_law(law: Law, links: f64, dissociation: f64, to: f64) -> Result<(), Failure> {
+fn print_law(law: Law, links: f64, dissociation: f64, to: f64) -> Result<(), PeriFailure> {
     if !(1.0 < to && to <= LARGEST_STRETCH) {
         let allowed = format!("above 1, at most {LARGEST_STRETCH}");
         return Err(crate::Error::Parameter { name: "--to", found: to, allowed }.into());

@@ -39,7 +39,7 @@ pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>
     to.add_if(q::CONTACTS, |m| Some(touching(m)?.pairs as f64));
     to.add_if(q::DEEPEST_OVERLAP, |m| touching(m).map(|_| deepest(m)));
     to.add_if(q::CONTACT_SHARE, share);
-    if contact.rubs() {
+    if contact.has_friction() {
         to.add_if(q::FRICTION_WORK, |m| m.state.history.last().map(|last| last.rubbed));
     }
     for (index, plane) in contact.plane.iter().enumerate() {

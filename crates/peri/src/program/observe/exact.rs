@@ -12,12 +12,12 @@ use harness::observe::{Curve, Observer, Scalars};
 type Normals = Vec<(Measure, Vec<f64>)>;
 
 /// Comparison with the closed form of a scene: peak and profile at θ = π/2, errors over regions.
-pub(super) struct Exact<'s> {
+pub(super) struct HoleErrors<'s> {
     scene: &'s Scene,
     found: Option<(HoleComparison, Normals)>,
 }
 
-impl<'s> Exact<'s> {
+impl<'s> HoleErrors<'s> {
     pub(super) fn new(scene: &'s Scene) -> Self {
         Self { scene, found: None }
     }
@@ -42,7 +42,7 @@ fn peak(hole: &HoleComparison, values: &[f64]) -> Option<f64> {
     hole.profile(values)[1].iter().copied().reduce(f64::max)
 }
 
-impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for Exact<'_> {
+impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for HoleErrors<'_> {
     fn scalars(&self, to: &mut Scalars<Moment<'m, D>>) {
         let (Some(spec), Some(stress)) = (&self.scene.exact, &self.scene.stress) else { return };
         let hole = || self.hole();

@@ -3,7 +3,7 @@
 use super::list::quantities;
 use super::probes::of_probe;
 use crate::program::quantities as q;
-use crate::program::scene::{self, Scene, Variant, variants};
+use crate::program::scene::{self, Scene, SceneVariant, variants};
 use harness::observe::Scalars;
 use harness::report::Named;
 use harness::scene::{SceneError, Source};
@@ -57,7 +57,7 @@ pub fn quantities_of(source: &Source, scene: &Scene) -> Result<Vec<String>, Scen
 ///
 /// # Errors
 /// As [`scene::check`]; the name, and those that are most like it.
-pub fn check(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<Variant>, SceneError> {
+pub fn check(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<SceneVariant>, SceneError> {
     let variants = scene::check(source, scene, quick)?;
     for variant in &variants {
         if variant.of.expect_error.is_none() {

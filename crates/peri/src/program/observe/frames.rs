@@ -1,6 +1,6 @@
 //! Fields of single steps: what is written during a run.
 
-use super::moment::{Moment, Observers};
+use super::moment::{Moment, SceneObservers};
 use crate::bonds::Kind;
 use crate::error::Error;
 use crate::program::scene::Scene;
@@ -11,7 +11,7 @@ use harness::output::vtkhdf::ParticleSeries;
 use std::path::Path;
 
 /// The field file of a variant.
-pub struct Frames {
+pub struct FieldFrames {
     series: Option<ParticleSeries>,
     /// The last step written.
     written: Option<usize>,
@@ -86,7 +86,7 @@ pub(super) fn stresses<const D: usize>(scene: &Scene, to: &mut Fields<Moment<D>>
     }
 }
 
-impl Frames {
+impl FieldFrames {
     /// Begins, or continues after the steps in `state`.
     ///
     /// # Errors
@@ -107,7 +107,11 @@ impl Frames {
     ///
     /// # Errors
     /// Files that cannot be written.
-    pub fn step<const D: usize>(&mut self, observers: &Observers<D>, m: &Moment<D>) -> Result<(), Error> {
+    pub fn step<const D: usize>(
+        &mut self,
+        observers: &SceneObservers<D>,
+        m: &Moment<D>,
+    ) -> Result<(), Error> {
         let (Some(every), state) = (m.scene.output.every, m.state) else { return Ok(()) };
         if is_stage(state.control.round) {
             let equilibrium = state.control.round as f64;
@@ -123,7 +127,11 @@ impl Frames {
     ///
     /// # Errors
     /// Files that cannot be written.
-    pub fn finish<const D: usize>(mut self, observers: &Observers<D>, m: &Moment<D>) -> Result<(), Error> {
+    pub fn finish<const D: usize>(
+        mut self,
+        observers: &SceneObservers<D>,
+        m: &Moment<D>,
+    ) -> Result<(), Error> {
         if self.written != Some(m.state.history.len()) {
             self.write(observers, m, m.state.step as f64)?;
         }
@@ -135,7 +143,7 @@ impl Frames {
 
     fn write<const D: usize>(
         &mut self,
-        observers: &Observers<D>,
+        observers: &SceneObservers<D>,
         m: &Moment<D>,
         time: f64,
     ) -> Result<(), Error> {

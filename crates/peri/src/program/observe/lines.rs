@@ -7,9 +7,9 @@ use crate::program::scene::{LineField, Scene, cuts_of, line_fields};
 use harness::observe::{Observer, Outputs};
 
 /// The lines of a scene.
-pub(super) struct Lines<'s>(pub &'s Scene);
+pub(super) struct LineObserver<'s>(pub &'s Scene);
 
-impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for Lines<'_> {
+impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for LineObserver<'_> {
     /// `line_NAME_VARIANT.csv` of every line.
     fn write(&self, m: &Moment<'m, D>, to: &Outputs) -> Result<(), Error> {
         let Self(scene) = self;

@@ -1,6 +1,6 @@
 //! What a variant of a scene is turned into before it is solved: a body, its material, its loads, what its outputs look at.
 
-use super::rows::{Row, rows};
+use super::rows::{RowPart, rows};
 use crate::bonds::{Bonds, Property};
 use crate::calibrate;
 use crate::correction::{bond_factors, surface_factors};
@@ -10,12 +10,12 @@ use crate::exact::Plate;
 use crate::material::{BondMaterial, Material, NonlocalSolid, Prestrained, Response, relief};
 use crate::potential::BondPotential;
 use crate::probe::{LineSampler, Solid, StressEvaluator};
-use crate::program::scene::{self, Body, Followed, Inclusions, Scene, SurfaceCorrection, Variant};
+use crate::program::scene::{
+    self, DiscreteBody, Inclusions, ParameterField, Scene, SceneVariant, SurfaceCorrection,
+};
 use crate::solver::{Criterion, Loads, State};
-use harness::scene::{SceneError, Source};
+use harness::scene::{Failure, SceneError, Source};
 use std::sync::Arc;
-
-type Failure = harness::scene::Failure<Error>;
 
 /// What acts between the particles of a scene.
 pub enum SceneMaterial<const D: usize> {
@@ -73,7 +73,7 @@ pub struct BodyWithMaterial<const D: usize> {
     /// Fracture energies of the critical stretch of a bond law.
     pub toughness: Option<Toughness>,
     /// The parameters that follow fields.
-    pub followed: Vec<Followed>,
+    pub followed: Vec<ParameterField>,
     /// Stiffness of the material over what it is without inclusions.
     pub stiffness: Property,
 }
@@ -86,9 +86,9 @@ impl<const D: usize> BodyWithMaterial<D> {
     pub fn new(
         source: &Source,
         scene: &Scene,
-        variant: &Variant,
-        body: &mut Body<D>,
-    ) -> Result<Self, Failure> {
+        variant: &SceneVariant,
+        body: &mut DiscreteBody<D>,
+    ) -> Result<Self, Failure<Error>> {
         let (space, spec) = (scene.body.space, &scene.material);
         let (horizon, thickness) = (body.bonds.horizon(), body.thickness);
         let fault = |error| match error {
@@ -173,7 +173,7 @@ pub struct Physics<const D: usize> {
     pub loaded: Vec<bool>,
     /// Particles of grips that are tied at their surface, by site.
     pub held: Option<Vec<bool>>,
-    rows: Vec<Row<D>>,
+    rows: Vec<RowPart<D>>,
     /// Forces and stresses, since [`Self::begin`], as the following.
     pub evaluator: StressEvaluator<D>,
     /// Bonds of each particle without cracks, and how many these have broken; only where there are cracks, or bonds break.
@@ -194,7 +194,11 @@ impl<const D: usize> Physics<D> {
     ///
     /// # Errors
     /// A fault of the scene.
-    pub fn new(source: &Source, scene: &Scene, variant: &Variant) -> Result<(Body<D>, Self), Failure> {
+    pub fn new(
+        source: &Source,
+        scene: &Scene,
+        variant: &SceneVariant,
+    ) -> Result<(DiscreteBody<D>, Self), Failure<Error>> {
         let mut body = scene::body_of::<D>(source, scene, variant)?;
         // before the loads: tractions act on the areas that it leaves
         if scene.material.solid.is_some()
@@ -237,8 +241,8 @@ impl<const D: usize> Physics<D> {
         &mut self,
         source: &Source,
         scene: &Scene,
-        variant: &Variant,
-        body: &Body<D>,
+        variant: &SceneVariant,
+        body: &DiscreteBody<D>,
     ) -> Result<(), SceneError> {
         let (bonds, own) = (&*body.bonds, &self.body);
         let breaks = own.criterion.is_some();

@@ -136,24 +136,24 @@ impl<'a, const D: usize> Moment<'a, D> {
 }
 
 /// The observers of a scene, in the order of their output.
-pub type Observers<'s, const D: usize> = Vec<Box<dyn for<'m> Observer<Moment<'m, D>, Error> + 's>>;
+pub type SceneObservers<'s, const D: usize> = Vec<Box<dyn for<'m> Observer<Moment<'m, D>, Error> + 's>>;
 
 /// An observer without memory and files: scalars, fields and warnings of a scene.
 #[derive(Clone, Copy)]
-pub(super) struct Values<'s, const D: usize> {
+pub(super) struct StatelessObserver<'s, const D: usize> {
     pub scene: &'s Scene,
     pub scalars: for<'t, 'm> fn(&Scene, &mut Scalars<'t, Moment<'m, D>>),
     pub fields: for<'t, 'm> fn(&Scene, &mut Fields<'t, Moment<'m, D>>),
     pub warnings: for<'m> fn(&Moment<'m, D>) -> Vec<String>,
 }
 
-impl<'s, const D: usize> Values<'s, D> {
+impl<'s, const D: usize> StatelessObserver<'s, D> {
     pub fn none(scene: &'s Scene) -> Self {
         Self { scene, scalars: |_, _| {}, fields: |_, _| {}, warnings: |_| Vec::new() }
     }
 }
 
-impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for Values<'_, D> {
+impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for StatelessObserver<'_, D> {
     fn scalars(&self, to: &mut Scalars<Moment<'m, D>>) {
         (self.scalars)(self.scene, to);
     }

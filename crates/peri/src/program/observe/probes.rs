@@ -4,7 +4,7 @@ use super::moment::Moment;
 use super::rows::width;
 use crate::probe::{crossing, first_swing, unwrapped};
 use crate::program::quantities as q;
-use crate::program::scene::{Probe, Scene, Track};
+use crate::program::scene::{HistoryProbe, Scene, Track};
 use harness::observe::Scalars;
 use harness::report::Quantity;
 use std::f64::consts::PI;
@@ -19,21 +19,21 @@ pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>
 }
 
 /// Time and number of each row in which a probe saw something.
-type Seen = [(f64, f64)];
+type ProbeRows = [(f64, f64)];
 
 /// The values of a probe; what was never seen has none.
-pub(super) fn of_probe<const D: usize>(probe: &Probe, column: usize, to: &mut Scalars<Moment<D>>) {
+pub(super) fn of_probe<const D: usize>(probe: &HistoryProbe, column: usize, to: &mut Scalars<Moment<D>>) {
     let turns = probe.track == Track::Rotation;
     let rows = |m: &Moment<D>| {
         let all = m.state.history.iter().map(|row| (row.time, row.seen[column]));
         let rows = all.filter(|(_, x)| x.is_finite()).collect();
         if turns { unwrapped(rows) } else { rows }
     };
-    let mut add = |quantity: Quantity, value: &dyn Fn(&Seen) -> Option<f64>| {
+    let mut add = |quantity: Quantity, value: &dyn Fn(&ProbeRows) -> Option<f64>| {
         to.add_if(probe.named(quantity), |m| value(&rows(m)).filter(|value| value.is_finite()));
     };
-    let frequency = |rows: &Seen| first_swing(rows).map(|(_, time)| PI / time);
-    let peak = |rows: &Seen| {
+    let frequency = |rows: &ProbeRows| first_swing(rows).map(|(_, time)| PI / time);
+    let peak = |rows: &ProbeRows| {
         let swing = if turns { first_swing(rows) } else { None };
         let until = swing.map_or(rows.len(), |(end, _)| end);
         rows[..until].iter().map(|row| row.1).max_by(|a, b| a.abs().total_cmp(&b.abs()))
@@ -50,7 +50,7 @@ pub(super) fn of_probe<const D: usize>(probe: &Probe, column: usize, to: &mut Sc
             Some([from, to]) => Some((to - from) / (crossing(rows, to)? - crossing(rows, from)?)),
             None => rows.first().zip(rows.last()).map(|(a, b)| (b.1 - a.1) / (b.0 - a.0)),
         });
-        let between = |rows: &Seen| -> Option<Vec<f64>> {
+        let between = |rows: &ProbeRows| -> Option<Vec<f64>> {
             let [from, to] = gauges?;
             Some(rows.iter().map(|row| row.1).filter(|x| (from..=to).contains(x)).collect())
         };

@@ -5,7 +5,7 @@ use crate::probe::{
     CrackTip, JIntegral, Section, StressEvaluator, WaveFront, mean_displacement, rotation, strain,
 };
 use crate::program::quantities as q;
-use crate::program::scene::{Body, Probe, Scene, Track};
+use crate::program::scene::{DiscreteBody, HistoryProbe, Scene, Track};
 use crate::solver::State;
 use harness::report::Named;
 use harness::scene::{SceneError, Source};
@@ -16,7 +16,7 @@ const AT_THE_TIP: [f64; 2] = [0.35, 0.9];
 const AT_THE_FRONT: f64 = 0.02;
 
 /// Numbers of a body in a state, a part of a row of the history.
-pub type Row<const D: usize> =
+pub type RowPart<const D: usize> =
     Box<dyn Fn(&dyn Bonds<D>, &State<D>, &StressEvaluator<D>) -> Vec<f64> + Send + Sync>;
 
 /// Parts of a row: of probes, of the flags of a learnt law, of sections.
@@ -26,13 +26,13 @@ pub type Row<const D: usize> =
 pub(super) fn rows<const D: usize>(
     source: &Source,
     scene: &Scene,
-    body: &Body<D>,
-) -> Result<Vec<Row<D>>, SceneError> {
+    body: &DiscreteBody<D>,
+) -> Result<Vec<RowPart<D>>, SceneError> {
     let probes = scene.probe.iter().enumerate();
     let probes = probes.map(|(index, spec)| probe(source, &format!("probe[{index}]"), spec, body));
-    let flags: Row<D> =
+    let flags: RowPart<D> =
         Box::new(|bonds, state, evaluator| evaluator.flagged(bonds, state).into_iter().flatten().collect());
-    let sections = scene.output.section.iter().enumerate().map(|(index, spec)| -> Result<Row<D>, _> {
+    let sections = scene.output.section.iter().enumerate().map(|(index, spec)| -> Result<RowPart<D>, _> {
         let key = format!("output.section[{index}]");
         let (point, normal) = spec.plane(source, &key)?;
         let allowed = "a point in the body: bonds must cross the plane";
@@ -50,9 +50,9 @@ pub(super) fn rows<const D: usize>(
 fn probe<const D: usize>(
     source: &Source,
     key: &str,
-    spec: &Probe,
-    body: &Body<D>,
-) -> Result<Row<D>, SceneError> {
+    spec: &HistoryProbe,
+    body: &DiscreteBody<D>,
+) -> Result<RowPart<D>, SceneError> {
     let (axis, bonds) = (spec.axis.map_or(0, |axis| axis.index()), &*body.bonds);
     let sites = || spec.members(source, key, body);
     Ok(match spec.track {
@@ -92,13 +92,13 @@ fn probe<const D: usize>(
 }
 
 /// Numbers of a probe in a row.
-pub(super) fn width(probe: &Probe) -> usize {
+pub(super) fn width(probe: &HistoryProbe) -> usize {
     1 + usize::from(probe.track == Track::Crack)
 }
 
 /// Columns of probes and flags in the table of the history, with their units.
 pub fn columns(scene: &Scene) -> Vec<(String, String)> {
-    let each = |probe: &Probe| {
+    let each = |probe: &HistoryProbe| {
         let own = (probe.name.clone(), probe.track.unit().to_owned());
         let across = (width(probe) > 1).then(|| probe.named(q::PROBE_ACROSS));
         [Some(own), across.map(|Named { name, unit }| (name, unit))]

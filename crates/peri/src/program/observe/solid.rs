@@ -18,7 +18,7 @@ pub const NOWHERE: [[f64; 3]; 2] = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
 
 /// A body at a moment: where its particles are, where they were at rest, and the values of one or two fields.
 #[derive(Clone)]
-pub struct Look {
+pub struct BodyView {
     pub title: String,
     pub places: Vec<[f64; 3]>,
     pub rest: Vec<[f64; 3]>,
@@ -26,13 +26,13 @@ pub struct Look {
 }
 
 /// A field in a picture: what its values are multiplied with, and its colours.
-pub struct Field {
+pub struct ColouredField {
     pub scale: f64,
     pub strip: Strip,
 }
 
 /// A variant in pictures.
-pub struct Picture<'a, const D: usize> {
+pub struct BodyPictures<'a, const D: usize> {
     pub moment: &'a Moment<'a, D>,
     /// Around all places.
     pub bounds: [[f64; 3]; 2],
@@ -67,7 +67,7 @@ pub fn shown(spec: &StressSpec, flat: bool, t: &[f64]) -> f64 {
 
 /// Stresses that the scene names, with a range that holds these values but the very extremes: a crushed particle's Cauchy
 /// stress would take all the colours.
-pub fn stress_field(spec: &StressSpec, mut values: Vec<f64>) -> Field {
+pub fn stress_field(spec: &StressSpec, mut values: Vec<f64>) -> ColouredField {
     values.retain(|value| !value.is_nan());
     values.sort_by(f64::total_cmp);
     let part =
@@ -84,19 +84,19 @@ pub fn stress_field(spec: &StressSpec, mut values: Vec<f64>) -> Field {
 }
 
 /// Broken bonds over those there were.
-pub fn damage_field() -> Field {
+pub fn damage_field() -> ColouredField {
     field("damage".to_owned(), 1.0, (0.0, 0.6))
 }
 
 /// Where a learnt law is uncertain: 1, elsewhere 0.
-pub fn flagged_field() -> Field {
+pub fn flagged_field() -> ColouredField {
     field("flagged".to_owned(), 1.0, (0.0, 1.0))
 }
 
-fn field(label: String, scale: f64, (low, high): (f64, f64)) -> Field {
+fn field(label: String, scale: f64, (low, high): (f64, f64)) -> ColouredField {
     let range = (low * scale, high * scale);
     let range = if range.0 < range.1 && (range.1 - range.0).is_finite() { range } else { (0.0, 1.0) };
-    Field { scale, strip: Strip { label, range, colors: ColorMap::Viridis } }
+    ColouredField { scale, strip: Strip { label, range, colors: ColorMap::Viridis } }
 }
 
 /// The end of a run without stages: stress, or the length of the displacement, and a second field.
@@ -105,7 +105,7 @@ fn field(label: String, scale: f64, (low, high): (f64, f64)) -> Field {
 /// A file that cannot be written.
 pub fn end<const D: usize>(
     m: &Moment<D>,
-    second: Option<(Field, Vec<f64>)>,
+    second: Option<(ColouredField, Vec<f64>)>,
     output: &Path,
 ) -> Result<(), Error> {
     let stresses = m.stresses()?;
@@ -129,12 +129,12 @@ pub fn end<const D: usize>(
     let mut bounds = NOWHERE;
     let title = title(&m.state.history, m.state.history.len() as f64);
     widen(&mut bounds, &places);
-    let look = Look { title, places, rest, values: [values, others.unwrap_or_default()] };
-    let picture = Picture { moment: m, bounds };
+    let look = BodyView { title, places, rest, values: [values, others.unwrap_or_default()] };
+    let picture = BodyPictures { moment: m, bounds };
     picture.draw(output, fields, 1, |_| Ok(Cow::Borrowed(&look)))
 }
 
-impl<const D: usize> Picture<'_, D> {
+impl<const D: usize> BodyPictures<'_, D> {
     /// Writes the stages beside one another, and the last in a full turn where the scene wants one.
     ///
     /// # Errors
@@ -142,9 +142,9 @@ impl<const D: usize> Picture<'_, D> {
     pub fn draw<'l>(
         &self,
         output: &Path,
-        fields: Vec<Field>,
+        fields: Vec<ColouredField>,
         stages: usize,
-        mut look: impl FnMut(usize) -> Result<Cow<'l, Look>, polycore::Error>,
+        mut look: impl FnMut(usize) -> Result<Cow<'l, BodyView>, polycore::Error>,
     ) -> Result<(), Error> {
         let (m, spacing) = (self.moment, self.moment.bonds.spacing());
         let spec = m.scene.output.solid.unwrap_or_default();
@@ -164,7 +164,7 @@ impl<const D: usize> Picture<'_, D> {
         };
         let mut stage = |index: usize| -> Result<(String, Skin), polycore::Error> {
             let look = look(index)?;
-            let Look { title, places, rest, values } = &*look;
+            let BodyView { title, places, rest, values } = &*look;
             let mut at_rest = NOWHERE;
             widen(&mut at_rest, rest);
             let bridge = bridge(m);

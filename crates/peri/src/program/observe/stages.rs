@@ -2,7 +2,7 @@
 
 use super::moment::Moment;
 use super::scale::{bridge, title};
-use super::solid::{self, Look, shown};
+use super::solid::{self, BodyView, shown};
 use crate::error::Error;
 use harness::output::picture::{FieldMap, Panel};
 use harness::output::vtkhdf;
@@ -27,11 +27,11 @@ pub fn stages<const D: usize>(m: &Moment<D>, output: &Path) -> Result<(), Error>
     let Some(spec) = &m.scene.stress else { return Ok(()) };
     let measure = format!("cauchy_{}", spec.measures[0].name());
     let flat = D == 2;
-    let look = |frame: usize| -> Result<Look, polycore::Error> {
+    let look = |frame: usize| -> Result<BodyView, polycore::Error> {
         let (places, moved) = (frames.points(frame)?, frames.data(frame, "displacement")?);
         let tensors = frames.data(frame, &measure)?;
         let at_rest = |(k, x): (usize, &[f64; 3])| [0, 1, 2].map(|d| x[d] - moved[3 * k + d]);
-        Ok(Look {
+        Ok(BodyView {
             title: title(history, frames.times()[frame]),
             rest: places.iter().enumerate().map(at_rest).collect(),
             places,
@@ -50,7 +50,7 @@ pub fn stages<const D: usize>(m: &Moment<D>, output: &Path) -> Result<(), Error>
     }
     let (mut stages, mut all, mut bounds) = (Vec::new(), Vec::new(), solid::NOWHERE);
     for &frame in &chosen {
-        let Look { title, places, rest, values: [stress, damage] } = look(frame)?;
+        let BodyView { title, places, rest, values: [stress, damage] } = look(frame)?;
         solid::widen(&mut bounds, &places);
         let (low, high) = rest.iter().fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x[1]), h.max(x[1])));
         let middle = 0.5 * (low + high);
@@ -70,7 +70,7 @@ pub fn stages<const D: usize>(m: &Moment<D>, output: &Path) -> Result<(), Error>
     let (field, damage) = (solid::stress_field(spec, all), solid::damage_field());
     let (scale, strips) = (field.scale, [field.strip.clone(), damage.strip.clone()]);
     if !flat {
-        let picture = solid::Picture { moment: m, bounds };
+        let picture = solid::BodyPictures { moment: m, bounds };
         let fields = vec![field, damage];
         picture.draw(output, fields, chosen.len(), |k| Ok(Cow::Owned(look(chosen[k])?)))?;
     }
@@ -80,7 +80,7 @@ pub fn stages<const D: usize>(m: &Moment<D>, output: &Path) -> Result<(), Error>
         let extent = |stage: &Stage| stage.places.iter().fold((f64::MAX, f64::MIN), ends);
         stages.iter().map(extent).map(|(low, high)| high - low).fold(0.0, f64::max)
     });
-    let layout = Layout::of(wide / tall, stages.len());
+    let layout = StageLayout::for_aspect(wide / tall, stages.len());
     let mut map = FieldMap::new().lengths("mm", 1e-3).columns(layout.columns).size(layout.size);
     if !flat {
         map = map.axes(["x", "z"]);
@@ -112,16 +112,16 @@ fn since(damage: f64, cracks: f64) -> f64 {
 }
 
 /// How stages are laid out: side by side, damage under stress; wide bodies one under another, damage beside stress.
-struct Layout {
+struct StageLayout {
     pairs: bool,
     columns: usize,
     /// Pixels of a body's longer side.
     size: usize,
 }
 
-impl Layout {
+impl StageLayout {
     /// For bodies `aspect` times as wide as high.
-    fn of(aspect: f64, stages: usize) -> Self {
+    fn for_aspect(aspect: f64, stages: usize) -> Self {
         match aspect {
             wide if wide > 1.8 => Self { pairs: true, columns: 2, size: 720 },
             narrow if narrow < 0.5 => Self { pairs: false, columns: stages, size: 720 },

@@ -40,12 +40,12 @@ pub(super) fn stretches<const D: usize>(_: &Scene, to: &mut Scalars<Moment<D>>) 
 }
 
 /// Error of the fitted bond law.
-pub(super) struct Fit<'s> {
+pub(super) struct FitError<'s> {
     scene: &'s Scene,
     error: f64,
 }
 
-impl<'s> Fit<'s> {
+impl<'s> FitError<'s> {
     pub(super) fn new(scene: &'s Scene) -> Self {
         Self { scene, error: f64::NAN }
     }
@@ -55,7 +55,7 @@ impl<'s> Fit<'s> {
     }
 }
 
-impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for Fit<'_> {
+impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for FitError<'_> {
     fn scalars(&self, to: &mut Scalars<Moment<'m, D>>) {
         if self.is_fitted() {
             to.add(q::FIT_ERROR, |_| self.error);
@@ -106,7 +106,7 @@ pub(super) fn responses<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D
         let length = |site| m.state.displacement.get(site).iter().map(|x| x * x).sum::<f64>().sqrt();
         m.sites().map(length).fold(0.0, f64::max)
     });
-    let holds = scene.boundary.iter().any(|boundary| boundary.holds());
+    let holds = scene.boundary.iter().any(|boundary| boundary.prescribes_displacement());
     let loads = scene.boundary.iter().any(|boundary| boundary.traction.is_some() || boundary.force.is_some());
     for (d, axis) in axes(scene).iter().enumerate() {
         if holds {

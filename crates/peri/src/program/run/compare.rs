@@ -1,6 +1,6 @@
 //! Comparison with closed forms, convergence, and the report.
 
-use super::outcome::{Outcome, families};
+use super::outcome::{VariantOutcome, families};
 use crate::exact;
 use crate::program::quantities as q;
 use crate::program::scene::{NAMING, Scene};
@@ -10,7 +10,7 @@ use harness::study::{self, Compare, SuiteRow};
 use std::path::Path;
 
 /// Seconds that a stress field of one measure takes from the scene on, as if it were the only one.
-pub fn run_time(outcome: &Outcome, measure: &str) -> f64 {
+pub fn run_time(outcome: &VariantOutcome, measure: &str) -> f64 {
     ["build", "solve", "deformation gradient", &format!("stress {measure}")]
         .map(|phase| outcome.seconds_of(phase))
         .iter()
@@ -18,14 +18,14 @@ pub fn run_time(outcome: &Outcome, measure: &str) -> f64 {
 }
 
 /// The report of all variants; with one variant its values keep their plain names.
-pub fn report(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool) -> Report {
+pub fn report(source: &Source, scene: &Scene, outcomes: &[VariantOutcome], quick: bool) -> Report {
     let mut report =
         Report::new("peri", env!("CARGO_PKG_VERSION"), &resolved(source, scene, outcomes, quick));
     report.threads(rayon::current_num_threads());
     // names must not depend on how many of the variants run
     let several =
         crate::program::scene::variants(source, scene, false).map_or(outcomes.len(), |all| all.len()) > 1;
-    let full = |name: &str, outcome: &Outcome| {
+    let full = |name: &str, outcome: &VariantOutcome| {
         if several { NAMING.value(&outcome.name, name) } else { name.to_owned() }
     };
     for outcome in outcomes {
@@ -101,7 +101,7 @@ pub fn report(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool)
 
 /// Adds `same_events[VARIANT]`, how many of the first events of a variant have the same bonds in the same load step as those of
 /// the reference, where bonds break.
-fn same_events(report: &mut Report, compare: &Compare, outcomes: &[Outcome]) {
+fn same_events(report: &mut Report, compare: &Compare, outcomes: &[VariantOutcome]) {
     let compared = || outcomes.iter().filter(|outcome| outcome.get(&compare.quantity).is_some());
     let truth = compared().find(|o| Some(&o.name) == compare.variant.as_ref());
     let Some(truth) = truth.filter(|truth| !truth.events.is_empty()) else { return };
@@ -113,7 +113,7 @@ fn same_events(report: &mut Report, compare: &Compare, outcomes: &[Outcome]) {
 }
 
 /// Name of a variant without its spacing, and without a number at its end.
-fn method(outcome: &Outcome) -> String {
+fn method(outcome: &VariantOutcome) -> String {
     match outcome.family.rsplit_once(' ') {
         Some((method, last)) if last.parse::<f64>().is_ok() => method.to_owned(),
         _ => outcome.family.clone(),
@@ -124,7 +124,7 @@ fn method(outcome: &Outcome) -> String {
 const SOFTEST: f64 = 0.1;
 
 /// The expectation that contact is stiff enough for its load to be right, of a variant in equilibrium.
-fn stiff_contact(scene: &Scene, outcome: &Outcome, several: bool) -> Option<Expect> {
+fn stiff_contact(scene: &Scene, outcome: &VariantOutcome, several: bool) -> Option<Expect> {
     let judged = scene.contact.as_ref().is_some_and(|contact| contact.short_range.is_none());
     outcome.get(q::CONTACT_SHARE.name).filter(|_| judged && scene.dynamics.is_none())?;
     let name = q::CONTACT_SHARE.name;
@@ -138,7 +138,7 @@ fn stiff_contact(scene: &Scene, outcome: &Outcome, several: bool) -> Option<Expe
 }
 
 /// The scene with everything that it left to defaults, as comments behind its text.
-fn resolved(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool) -> String {
+fn resolved(source: &Source, scene: &Scene, outcomes: &[VariantOutcome], quick: bool) -> String {
     let Scene { material, solver, stress, output, .. } = scene;
     let mut text = format!("{}\n# as run, with defaults (quick = {quick}):\n", source.text.trim_end());
     for line in [format!("{material:?}"), format!("{solver:?}"), format!("{stress:?}"), format!("{output:?}")]
@@ -152,7 +152,7 @@ fn resolved(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool) -
 }
 
 /// Names and units of the values of all variants, in the order in which they come.
-fn columns(outcomes: &[Outcome]) -> Vec<(&str, &str)> {
+fn columns(outcomes: &[VariantOutcome]) -> Vec<(&str, &str)> {
     let mut columns: Vec<(&str, &str)> = Vec::new();
     for (name, _, unit) in outcomes.iter().flat_map(|o| &o.values) {
         if !columns.iter().any(|(known, _)| known == name) {
@@ -163,7 +163,7 @@ fn columns(outcomes: &[Outcome]) -> Vec<(&str, &str)> {
 }
 
 /// Variants as lines of a table: size, work, time, then their main results; `study.csv` has all of them.
-pub fn table(outcomes: &[Outcome]) -> String {
+pub fn table(outcomes: &[VariantOutcome]) -> String {
     use std::fmt::Write;
     // once a body is torn, reactions are those of its pieces
     let torn = outcomes.iter().any(|o| o.history.iter().any(|r| r.broken > 0));
@@ -217,10 +217,10 @@ fn digits(value: f64) -> String {
 }
 
 /// What the results do not say by themselves: warnings, runs in which nothing broke, how far a peak is known.
-pub fn notes(outcomes: &[Outcome]) -> String {
+pub fn notes(outcomes: &[VariantOutcome]) -> String {
     let mut lines = Vec::new();
     let several = outcomes.len() > 1;
-    let of = |outcome: &Outcome| if several { format!("{}: ", outcome.name) } else { String::new() };
+    let of = |outcome: &VariantOutcome| if several { format!("{}: ", outcome.name) } else { String::new() };
     for outcome in outcomes {
         lines.extend(outcome.warnings.iter().map(|text| format!("warning: {}{text}", of(outcome))));
         let unbroken = outcome.history.last().is_some_and(|last| last.broken == 0);
@@ -231,7 +231,7 @@ pub fn notes(outcomes: &[Outcome]) -> String {
         }
     }
     for (family, change) in super::history::peak_changes(outcomes) {
-        let members: Vec<&Outcome> = outcomes.iter().filter(|o| o.family == family).collect();
+        let members: Vec<&VariantOutcome> = outcomes.iter().filter(|o| o.family == family).collect();
         let step = members.iter().filter_map(|o| o.step_at_peak()).fold(0.0, f64::max);
         let known = if step >= change { ": smaller steps first" } else { "" };
         lines.push(format!(
@@ -247,8 +247,8 @@ pub fn notes(outcomes: &[Outcome]) -> String {
 ///
 /// # Errors
 /// A file that cannot be written.
-pub fn suite(report: &mut Report, outcomes: &[Outcome], output: &Path) -> Result<(), polycore::Error> {
-    let row = |outcome: &'_ Outcome| {
+pub fn suite(report: &mut Report, outcomes: &[VariantOutcome], output: &Path) -> Result<(), polycore::Error> {
+    let row = |outcome: &'_ VariantOutcome| {
         let value = |name: &str| outcome.get(name).unwrap_or(f64::NAN);
         format!(
             "stretches {:.3} to {:.3}, residual {:.1e}, {} bonds broken",
@@ -272,7 +272,7 @@ pub fn suite(report: &mut Report, outcomes: &[Outcome], output: &Path) -> Result
 }
 
 /// All values of all variants, a row for each.
-pub fn write(outcomes: &[Outcome], output: &Path) -> Result<(), polycore::Error> {
+pub fn write(outcomes: &[VariantOutcome], output: &Path) -> Result<(), polycore::Error> {
     if outcomes.len() < 2 {
         return Ok(());
     }

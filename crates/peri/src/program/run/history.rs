@@ -1,6 +1,6 @@
 //! The history of loading: values, tables and curves of load against displacement and of energies.
 
-use super::outcome::Outcome;
+use super::outcome::VariantOutcome;
 use crate::probe::envelope;
 use crate::program::observe::{damped, is_dynamic};
 use crate::program::scene::Scene;
@@ -14,17 +14,17 @@ use std::path::Path;
 const LEGEND: usize = 8;
 
 /// A column: name, unit, values.
-type Column = (String, String, Vec<f64>);
+type HistoryColumn = (String, String, Vec<f64>);
 
-impl Outcome {
+impl VariantOutcome {
     pub(super) fn is_dynamic(&self) -> bool {
         is_dynamic(&self.history)
     }
 
     /// The steps as columns.
-    pub fn columns(&self) -> Vec<Column> {
+    pub fn columns(&self) -> Vec<HistoryColumn> {
         let each = |get: &dyn Fn(&Record) -> f64| self.history.iter().map(get).collect();
-        let mut columns: Vec<Column> = Vec::new();
+        let mut columns: Vec<HistoryColumn> = Vec::new();
         columns.extend([
             ("displacement".to_owned(), "m".to_owned(), each(&|r| r.displacement)),
             ("load".to_owned(), "N".to_owned(), each(&|r| r.load)),
@@ -102,8 +102,8 @@ impl Outcome {
 }
 
 /// Peaks as far as load steps resolve them, a line for each variant with several steps.
-pub fn peak_lines(outcomes: &[Outcome]) -> String {
-    let line = |outcome: &Outcome| {
+pub fn peak_lines(outcomes: &[VariantOutcome]) -> String {
+    let line = |outcome: &VariantOutcome| {
         let peak = (0..outcome.history.len())
             .max_by(|&a, &b| outcome.history[a].load.total_cmp(&outcome.history[b].load))?;
         let (at, name) = (outcome.history[peak].displacement, &outcome.name);
@@ -138,8 +138,8 @@ pub fn peak_lines(outcomes: &[Outcome]) -> String {
 }
 
 /// How much the peak load still changes between the two finest spacings of each family, over the finest.
-pub fn peak_changes(outcomes: &[Outcome]) -> Vec<(String, f64)> {
-    let change = |(family, members): (String, Vec<&Outcome>)| {
+pub fn peak_changes(outcomes: &[VariantOutcome]) -> Vec<(String, f64)> {
+    let change = |(family, members): (String, Vec<&VariantOutcome>)| {
         let mut finest = members.iter().rev().map(|o| o.get("peak_load"));
         let (last, before) = (finest.next()??, finest.next()??);
         (last != 0.0).then(|| (family, ((last - before) / last).abs()))
@@ -148,7 +148,7 @@ pub fn peak_changes(outcomes: &[Outcome]) -> Vec<(String, f64)> {
 }
 
 /// Peak load over spacing, where variants differ in it.
-fn peaks(outcomes: &[Outcome], output: &Path) -> Result<(), Error> {
+fn peaks(outcomes: &[VariantOutcome], output: &Path) -> Result<(), Error> {
     let mut plot = LinePlot::new("Peak load").size(900.0, 560.0).axes("spacing Δx (mm)", "peak load (N)");
     let mut any = false;
     for (family, members) in super::outcome::families(outcomes) {
@@ -163,8 +163,8 @@ fn peaks(outcomes: &[Outcome], output: &Path) -> Result<(), Error> {
 }
 
 /// Tables of every variant, one plot of all loads, and a plot of energies for each variant whose bonds break.
-pub fn write(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), Error> {
-    let several: Vec<&Outcome> = outcomes.iter().filter(|o| o.history.len() > 1).collect();
+pub fn write(scene: &Scene, outcomes: &[VariantOutcome], output: &Path) -> Result<(), Error> {
+    let several: Vec<&VariantOutcome> = outcomes.iter().filter(|o| o.history.len() > 1).collect();
     for outcome in &several {
         let columns = outcome.columns();
         let views: Vec<_> = columns.iter().map(|(n, u, v)| (n.as_str(), u.as_str(), v.as_slice())).collect();
@@ -202,7 +202,7 @@ pub fn write(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), E
         std::iter::once(0.0).chain(values.iter().map(|v| v * scale)).collect()
     };
     // a body in free flight has neither
-    let loaded: Vec<&&Outcome> =
+    let loaded: Vec<&&VariantOutcome> =
         several.iter().filter(|o| o.history.iter().any(|r| r.load != 0.0 || r.displacement != 0.0)).collect();
     for outcome in &loaded {
         let columns = outcome.columns();

@@ -7,17 +7,17 @@ mod outcome;
 mod program;
 mod variants;
 
-pub use outcome::{Outcome, Profile};
+pub use outcome::{Profile, VariantOutcome};
 pub use program::Peri;
 
-use variants::UnderWay;
+use variants::VariantRun;
 
 use crate::bonds::{Bonds, Property};
 use crate::calibrate::Space;
 use crate::error::Error;
-use crate::program::observe::{self, Frames, Moment, Observers, Physics, in_space};
+use crate::program::observe::{self, FieldFrames, Moment, Physics, SceneObservers, in_space};
 use crate::program::quantities as q;
-use crate::program::scene::{self, NAMING, Scene, Variant};
+use crate::program::scene::{self, NAMING, Scene, SceneVariant};
 use crate::solver::{Breaking, Method, Record, State, Status, System, load_stepping};
 use harness::case::{Fault, Run, Step, StepField};
 use harness::observe::{Outputs, Scalars};
@@ -29,20 +29,20 @@ use std::cell::RefCell;
 use std::path::Path;
 
 /// What stops a run: a fault in the scene, or one on the way.
-pub type Failure = harness::scene::Failure<Error>;
+pub type PeriFailure = harness::scene::Failure<Error>;
 
 /// Particles of a body from which on its own loops keep all threads busy: such variants are solved one after another.
 const LARGE: usize = 100_000;
 
 /// A finished run.
-pub struct Finished {
+pub struct FinishedScene {
     /// As written to `report.json`.
     pub report: Report,
     /// The variants, in the order they ran.
-    pub outcomes: Vec<Outcome>,
+    pub outcomes: Vec<VariantOutcome>,
 }
 
-impl Finished {
+impl FinishedScene {
     /// For the terminal: all values of a single variant, a line for each of several, then the judged expectations.
     pub fn summary(&self) -> String {
         let notes = compare::notes(&self.outcomes);
@@ -60,15 +60,19 @@ impl Finished {
 /// Runs a scene in its dimension, all but `report.json`, which [`Run::finish`] writes.
 ///
 /// # Errors
-/// [`Failure`]; nothing half-written remains, and an interrupted run can be resumed.
-pub fn run(source: &Source, scene: &Scene, run: &mut Run) -> Result<Finished, Failure> {
+/// [`PeriFailure`]; nothing half-written remains, and an interrupted run can be resumed.
+pub fn run(source: &Source, scene: &Scene, run: &mut Run) -> Result<FinishedScene, PeriFailure> {
     match scene.body.space {
         Space::Solid => run_in::<3>(source, scene, run),
         _ => run_in::<2>(source, scene, run),
     }
 }
 
-fn run_in<const D: usize>(source: &Source, scene: &Scene, run: &mut Run) -> Result<Finished, Failure> {
+fn run_in<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    run: &mut Run,
+) -> Result<FinishedScene, PeriFailure> {
     let (output, quick) = (run.options.output, run.options.quick);
     let variants = observe::check(source, scene, quick)?;
     // every body is built once before anything is computed or written: faults show at once
@@ -85,31 +89,31 @@ fn run_in<const D: usize>(source: &Source, scene: &Scene, run: &mut Run) -> Resu
     let alone = run.options.on_step.is_some() || timed || largest > LARGE;
     let fitting = (available() / memory) as usize;
     let at_once = if alone { 1 } else { rayon::current_num_threads().min(fitting).max(1) };
-    let names: Vec<String> = variants.iter().map(Variant::name).collect();
+    let names: Vec<String> = variants.iter().map(SceneVariant::name).collect();
     let lengths = scene::free_lengths::<D>(&variants)?;
     let mut finished = study::solve(run, NAMING, &names, at_once, |index, own| {
         let variant = &variants[index];
         let (state, expected) = (own.reached()?, variant.of.expect_error.as_deref());
         let (own_source, own_scene) = variant.resolved();
         let outcome = scene::check_variant(own_source, own_scene)
-            .map_err(Failure::from)
+            .map_err(PeriFailure::from)
             .and_then(|()| {
-                run_variant::<D>(own_source, own_scene, variant, output, &UnderWay(own.into()), state)
+                run_variant::<D>(own_source, own_scene, variant, output, &VariantRun(own.into()), state)
             })
             .and_then(|(outcome, ended)| match ended {
                 Some(error) if expected.is_none_or(|text| !error.to_string().contains(text)) => {
                     kept((source, scene, quick), outcome, &error, output)?;
-                    Err(Failure::Run(error))
+                    Err(PeriFailure::Run(error))
                 }
                 _ => Ok(outcome),
             });
         let mut outcome = match study::expected(outcome, expected) {
-            Err(Failure::Run(error)) if variants.len() > 1 && !error.is_interruption() => {
+            Err(PeriFailure::Run(error)) if variants.len() > 1 && !error.is_interruption() => {
                 return Err(Error::Within { variant: variant.name(), error: Box::new(error) }.into());
             }
-            outcome => outcome?.unwrap_or_else(|error| Outcome {
+            outcome => outcome?.unwrap_or_else(|error| VariantOutcome {
                 error: Some(error),
-                ..Outcome::new(variant.name(), variant)
+                ..VariantOutcome::new(variant.name(), variant)
             }),
         };
         if expected.is_some() {
@@ -126,16 +130,16 @@ fn run_in<const D: usize>(source: &Source, scene: &Scene, run: &mut Run) -> Resu
     if scene.output.pictures {
         draw::curves(scene, &finished, output)?;
     }
-    Ok(Finished { report, outcomes: finished })
+    Ok(FinishedScene { report, outcomes: finished })
 }
 
 /// Writes what there is of a variant that ended in an error: its history, its values, and a report that has not passed.
 fn kept(
     (source, scene, quick): (&Source, &Scene, bool),
-    outcome: Outcome,
+    outcome: VariantOutcome,
     error: &Error,
     output: &Path,
-) -> Result<(), Failure> {
+) -> Result<(), PeriFailure> {
     let outcomes = [outcome];
     history::write(scene, &outcomes, output)?;
     let mut report = compare::report(source, scene, &outcomes, quick);
@@ -147,24 +151,24 @@ fn kept(
 fn run_variant<const D: usize>(
     source: &Source,
     scene: &Scene,
-    variant: &Variant,
+    variant: &SceneVariant,
     output: &Path,
-    under_way: &UnderWay,
+    under_way: &VariantRun,
     state: Option<State<D>>,
-) -> Result<(Outcome, Option<Error>), Failure> {
+) -> Result<(VariantOutcome, Option<Error>), PeriFailure> {
     let phases = RefCell::new(Phases::new());
     phases.borrow_mut().start("build");
     let (mut body, mut physics) = Physics::<D>::new(source, scene, variant)?;
     physics.begin(source, scene, variant, &body)?;
     phases.borrow_mut().stop();
-    let mut outcome = Outcome::new(variant.name(), variant);
+    let mut outcome = VariantOutcome::new(variant.name(), variant);
     physics.name = outcome.file_name();
     outcome.warnings = scene::warnings(source, scene, &body);
     outcome.warnings.extend(scene::tearing_warnings(scene, &body, physics.body.toughness.as_ref()));
     outcome.snaps_back = scene.solver.snap_back;
     let mut state = begin((source, scene), &body, state, output)?;
     let mut observers = observe::observers::<D>(scene);
-    let mut frames = Frames::new(scene, &state, &output.join(physics.field_file()))?;
+    let mut frames = FieldFrames::new(scene, &state, &output.join(physics.field_file()))?;
     let ended = match solve(
         (source, scene),
         &physics,
@@ -174,7 +178,9 @@ fn run_variant<const D: usize>(
         &phases,
         (&mut observers, &mut frames),
     ) {
-        Err(Failure::Run(error @ Error::NoEquilibrium { .. })) if !state.history.is_empty() => Some(error),
+        Err(PeriFailure::Run(error @ Error::NoEquilibrium { .. })) if !state.history.is_empty() => {
+            Some(error)
+        }
         other => other.map(|()| None)?,
     };
     if let Some(error) = &ended {
@@ -194,7 +200,7 @@ fn run_variant<const D: usize>(
         let mut take = |named, value| outcome.value(named, value);
         observer.scalars(&mut Scalars::new(Some(&moment), &mut take));
         outcome.warnings.extend(observer.warnings(&moment));
-        outcome.profiles.extend(observer.curves(&moment).into_iter().filter_map(Profile::of));
+        outcome.profiles.extend(observer.curves(&moment).into_iter().filter_map(Profile::from_curve));
     }
     phases.borrow_mut().stop();
     outcome.work_of(&*body.bonds, &state);
@@ -215,10 +221,10 @@ fn run_variant<const D: usize>(
 /// The state from which a variant is solved: the undeformed body, unless the checkpoint has one.
 fn begin<const D: usize>(
     (source, scene): (&Source, &Scene),
-    body: &scene::Body<D>,
+    body: &scene::DiscreteBody<D>,
     state: Option<State<D>>,
     output: &Path,
-) -> Result<State<D>, Failure> {
+) -> Result<State<D>, PeriFailure> {
     let sites = body.bonds.sites();
     let Some(state) = state else {
         let mut state = State::new(sites);
@@ -238,18 +244,18 @@ fn begin<const D: usize>(
 fn solve<const D: usize>(
     (source, scene): (&Source, &Scene),
     physics: &Physics<D>,
-    under_way: &UnderWay,
-    body: &mut scene::Body<D>,
+    under_way: &VariantRun,
+    body: &mut scene::DiscreteBody<D>,
     state: &mut State<D>,
     phases: &RefCell<Phases>,
-    (observers, frames): (&mut Observers<D>, &mut Frames),
-) -> Result<(), Failure> {
+    (observers, frames): (&mut SceneObservers<D>, &mut FieldFrames),
+) -> Result<(), PeriFailure> {
     let (material, loads) = (&physics.body.material, &physics.loads);
     let factors = scene.solver.factors();
     let mut watch = |status: &Status, state: &State<D>| under_way.watch(status, state);
     let contact = match &scene.contact {
         Some(contact) => {
-            let planes = contact.planes(source, scene.dynamics.is_some()).map_err(Failure::from)?;
+            let planes = contact.planes(source, scene.dynamics.is_some()).map_err(PeriFailure::from)?;
             let whole = material.longitudinal_modulus(&*body.bonds);
             let modulus = Property::new(&*body.bonds, |site, _| whole * physics.body.stiffness.at(site));
             let held = physics.held.as_deref();
@@ -259,7 +265,7 @@ fn solve<const D: usize>(
         None => None,
     };
     let course = scene.dynamics.as_ref().and_then(|dynamics| dynamics.factor.as_ref());
-    let course = course.map(|formula| |time: f64| formula.in_time(time));
+    let course = course.map(|formula| |time: f64| formula.value_and_rate(time));
     let row = |bonds: &dyn Bonds<D>, state: &State<D>| physics.row(bonds, state);
     let response = material.respond(&*body.bonds);
     let mut system = System::of_response(&mut *body.bonds, response, loads, &factors);
@@ -326,7 +332,7 @@ fn part_of(status: &Status) -> f64 {
 ///
 /// # Errors
 /// A fault of the scene.
-pub fn explanation(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<String>, Failure> {
+pub fn explanation(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<String>, PeriFailure> {
     match scene.body.space {
         Space::Solid => explanation_in::<3>(source, scene, quick),
         _ => explanation_in::<2>(source, scene, quick),
@@ -337,7 +343,7 @@ fn explanation_in<const D: usize>(
     source: &Source,
     scene: &Scene,
     quick: bool,
-) -> Result<Vec<String>, Failure> {
+) -> Result<Vec<String>, PeriFailure> {
     let mut lines = Vec::new();
     let variants = observe::check(source, scene, quick)?;
     let lengths = scene::free_lengths::<D>(&variants)?;

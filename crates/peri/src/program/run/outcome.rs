@@ -1,7 +1,7 @@
 //! Results of one variant.
 
 use crate::bonds::{Bonds, Fragment};
-use crate::program::scene::Variant;
+use crate::program::scene::SceneVariant;
 use crate::solver::{Event, Record, State};
 use harness::observe::Curve;
 use harness::report::{Named, Phases};
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 /// Everything of a variant that outlives its fields.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Outcome {
+pub struct VariantOutcome {
     /// The variant's name.
     pub name: String,
     /// Spacing, m.
@@ -62,15 +62,15 @@ pub struct Profile {
 
 impl Profile {
     /// Of a curve of two columns.
-    pub fn of(curve: Curve) -> Option<Self> {
+    pub fn from_curve(curve: Curve) -> Option<Self> {
         let mut columns = curve.columns.into_iter().map(|(_, _, values)| values);
         Some(Self { name: curve.name, at: columns.next()?, value: columns.next()? })
     }
 }
 
-impl Outcome {
+impl VariantOutcome {
     /// Nothing yet.
-    pub fn new(name: String, variant: &Variant) -> Self {
+    pub fn new(name: String, variant: &SceneVariant) -> Self {
         Self {
             name,
             spacing: variant.spacing,
@@ -146,7 +146,7 @@ impl Outcome {
     }
 }
 
-impl Solved for Outcome {
+impl Solved for VariantOutcome {
     fn name(&self) -> &str {
         &self.name
     }
@@ -161,8 +161,8 @@ impl Solved for Outcome {
 }
 
 /// Families of variants that differ in spacing only, coarse to fine, at least two in each.
-pub fn families(outcomes: &[Outcome]) -> Vec<(String, Vec<&Outcome>)> {
-    let mut families: Vec<(String, Vec<&Outcome>)> = Vec::new();
+pub fn families(outcomes: &[VariantOutcome]) -> Vec<(String, Vec<&VariantOutcome>)> {
+    let mut families: Vec<(String, Vec<&VariantOutcome>)> = Vec::new();
     for outcome in outcomes {
         match families.iter_mut().find(|(name, _)| *name == outcome.family) {
             Some((_, members)) => members.push(outcome),

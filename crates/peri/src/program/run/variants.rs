@@ -7,9 +7,9 @@ use harness::case::{Run, Step};
 use std::cell::RefCell;
 
 /// The run of a variant: its checkpoint, its progress, who watches it.
-pub struct UnderWay<'a, 'r>(pub RefCell<&'a mut Run<'r>>);
+pub struct VariantRun<'a, 'r>(pub RefCell<&'a mut Run<'r>>);
 
-impl UnderWay<'_, '_> {
+impl VariantRun<'_, '_> {
     /// After an iteration: shows it, keeps its state where a checkpoint is due, ends where the user or another variant asks for it.
     ///
     /// # Errors

@@ -1,24 +1,24 @@
-//! Values that can be judged without building anything, and the list of variants to run.
+//! Checks of a scene that need no body, and the list of its variants.
 
 use super::values::{ONE_OF_THEM, plain, positive, ratio, required};
-use super::variant::{Variant, variants};
-use super::{HORIZON_RATIO, Method, Parameter, Probe, Scene, Track};
+use super::variant::{SceneVariant, variants};
+use super::{HORIZON_RATIO, HistoryProbe, Scene, SolverMethod, Track, VaryingParameter};
 use crate::calibrate::{Calibration, Space};
 use crate::solver::Policy;
 use crate::stress::Measure;
 use harness::scene::{SceneError, Source};
 
-/// Rows of history of a run in time.
+/// Largest number of history rows of a run in time.
 const MOST_RECORDS: usize = 1_000_000;
 
 /// Checks a scene and lists its variants; `quick` leaves out those that a `--quick` run leaves out.
 ///
 /// # Errors
 /// A [`SceneError`] that names the key, the value found and what is allowed.
-pub fn check(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<Variant>, SceneError> {
+pub fn check(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<SceneVariant>, SceneError> {
     let variants = variants(source, scene, quick)?;
     for variant in &variants {
-        // what must fail does so when its turn comes
+        // a variant that must fail does so when it runs
         if variant.of.expect_error.is_none() {
             let (source, scene) = variant.resolved();
             check_variant(source, scene)?;
@@ -31,7 +31,7 @@ pub fn check(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<Variant>
     Ok(variants)
 }
 
-/// Checks the scene of one variant, see [`Variant::resolved`].
+/// Checks the scene of one variant, see [`SceneVariant::resolved`].
 ///
 /// # Errors
 /// As [`check`].
@@ -83,14 +83,15 @@ pub fn check_variant(source: &Source, scene: &Scene) -> Result<(), SceneError> {
 }
 
 fn dynamics(source: &Source, scene: &Scene) -> Result<(), SceneError> {
-    let explicit = scene.method() == Method::Verlet;
+    let explicit = scene.method() == SolverMethod::Verlet;
     match &scene.dynamics {
         None if explicit => {
             let why = "needed for `method = \"verlet\"`: a block with `density` and `end_time`";
             return Err(source.missing("dynamics", why));
         }
         Some(_) if !explicit => {
-            let why = format!("needs `solver.method = \"verlet\"`; `{}` is quasi-static", scene.method().name());
+            let why =
+                format!("needs `solver.method = \"verlet\"`; `{}` is quasi-static", scene.method().name());
             return Err(source.unexpected("dynamics", why));
         }
         Some(dynamics) => {
@@ -124,13 +125,13 @@ fn dynamics(source: &Source, scene: &Scene) -> Result<(), SceneError> {
                 if dynamics.ramp.is_some() {
                     return Err(source.conflict("dynamics.factor", "ramp", ONE_OF_THEM));
                 }
-                if let Some(found) = factor.other_than("t") {
+                if let Some(found) = factor.find_variable_except("t") {
                     let found = format!("`{found}` in `{}`", factor.text());
                     return Err(source.error("dynamics.factor", found, "a formula of `t`, the time in s"));
                 }
                 for part in 0..=16 {
                     let time = method.end_time * f64::from(part) / 16.0;
-                    let (value, rate) = factor.in_time(time);
+                    let (value, rate) = factor.value_and_rate(time);
                     if !(value.is_finite() && rate.is_finite()) {
                         let found = format!("{value}, rising at {rate} 1/s, at {time} s");
                         return Err(source.error("dynamics.factor", found, "finite values and rates"));
@@ -140,11 +141,12 @@ fn dynamics(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         }
         None => {}
     }
-    let moving = scene.boundary.iter().position(super::Boundary::moves);
+    let moving = scene.boundary.iter().position(super::Boundary::prescribes_velocity);
     match moving.filter(|_| !explicit) {
         Some(index) => {
             let key = format!("boundary[{index}].velocity");
-            let why = format!("needs `solver.method = \"verlet\"`; `{}` is quasi-static", scene.method().name());
+            let why =
+                format!("needs `solver.method = \"verlet\"`; `{}` is quasi-static", scene.method().name());
             Err(source.unexpected(&key, why))
         }
         None => Ok(()),
@@ -182,13 +184,16 @@ fn body(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     let name = if body.grid.is_some() { "grid" } else { "points" };
     match (body.shapes().is_empty(), body.has_points()) {
         (true, false) => {
-            return Err(source.missing("body.shapes", "needed for the body, as `shapes`, `points` or a `grid`"));
+            return Err(
+                source.missing("body.shapes", "needed for the body, as `shapes`, `points` or a `grid`")
+            );
         }
         (_, true) if body.shapes.is_some() => {
             return Err(source.conflict(&format!("body.{name}"), "shapes", ONE_OF_THEM));
         }
         (false, false) => {
-            let spacing = required(source, "body.spacing", body.spacing, "needed for a lattice of particles")?;
+            let spacing =
+                required(source, "body.spacing", body.spacing, "needed for a lattice of particles")?;
             positive(source, "body.spacing", spacing.si(), "m")?;
             ratio(source, "body.horizon_ratio", body.horizon_ratio.unwrap_or(HORIZON_RATIO))?;
             if body.horizon.is_some() {
@@ -277,7 +282,7 @@ fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             return Err(source.error(&key, format!("`{}` a second time", field.of.name()), "each once"));
         }
         let energy = material.critical.is_some_and(|critical| critical.fracture_energy.is_some());
-        if field.of == Parameter::FractureEnergy && !energy {
+        if field.of == VaryingParameter::FractureEnergy && !energy {
             let allowed = "`material.critical.fracture_energy` beside it";
             return Err(source.error(&key, "a fracture energy of a material without one", allowed));
         }
@@ -289,7 +294,7 @@ fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             let why = "prestrained bonds take `tearing` or `bonds`";
             return Err(source.conflict("material.critical.convention", "prestrain", why));
         }
-        let j_integral = |probe: &Probe| probe.track == Track::JIntegral;
+        let j_integral = |probe: &HistoryProbe| probe.track == Track::JIntegral;
         for (key, given) in [
             ("stress", scene.stress.is_some()),
             ("output.section", !scene.output.section.is_empty()),
@@ -335,17 +340,17 @@ fn solver(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     }
     within("max_iterations", solver.max_iterations as f64, 1.0, 1e9)?;
     within("mass_safety", solver.mass_safety.unwrap_or(1.1), 1.0, 100.0)?;
-    if solver.mass_safety.is_some() && scene.method() != Method::Adr {
+    if solver.mass_safety.is_some() && scene.method() != SolverMethod::Adr {
         let why = format!("`{}` has no fictitious mass; `method = \"adr\"` has", scene.method().name());
         return Err(source.unexpected("solver.mass_safety", why));
     }
     within("refine", solver.refine as f64, 1.0, 1e6)?;
     let refuses = [
         (scene.material.critical.is_none(), "bonds that never break"),
-        (scene.method() == Method::Verlet, "explicit dynamics"),
+        (scene.method() == SolverMethod::Verlet, "explicit dynamics"),
         (solver.breaking == Policy::EachIteration, "`breaking = \"each-iteration\"`"),
         (scene.material.critical.is_some_and(|critical| critical.strength.is_some()), "bonds that soften"),
-        (scene.contact.as_ref().is_some_and(super::ContactSpec::rubs), "friction"),
+        (scene.contact.as_ref().is_some_and(super::ContactSpec::has_friction), "friction"),
     ];
     if let Some((_, what)) = refuses.into_iter().find(|(refused, _)| *refused && solver.refine > 1) {
         let allowed =

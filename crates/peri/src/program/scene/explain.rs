@@ -1,8 +1,8 @@
 //! Lists what a scene builds and what it leaves out, for `peri check`.
 
 use super::values::plain;
-use super::variant::Variant;
-use super::{Body, Boundary, Method, Scene, SurfaceCorrection};
+use super::variant::SceneVariant;
+use super::{Boundary, DiscreteBody, Scene, SolverMethod, SurfaceCorrection};
 use crate::bonds::VolumeCorrection;
 use crate::material::Point;
 use crate::solver::Criterion;
@@ -13,8 +13,8 @@ use harness::scene::{SceneError, Source};
 pub fn explain<const D: usize>(
     source: &Source,
     scene: &Scene,
-    variant: &Variant,
-    body: &Body<D>,
+    variant: &SceneVariant,
+    body: &DiscreteBody<D>,
     criterion: Option<&Criterion>,
     reports: &[Named],
 ) -> Result<Vec<String>, SceneError> {
@@ -68,7 +68,7 @@ pub fn explain<const D: usize>(
         };
         builds(format!("bonds that break {limit}; damage of each particle"));
     }
-    if scene.method() == Method::Lbfgs {
+    if scene.method() == SolverMethod::Lbfgs {
         builds("L-BFGS: ten pairs of steps and gradient changes, a factored coarse level".to_owned());
     }
     if scene.solver.refine > 1 {
@@ -97,7 +97,7 @@ pub fn explain<const D: usize>(
         if !contact.plane.is_empty() {
             builds(format!("{} rigid planes, faces of the body", contact.plane.len()));
         }
-        if contact.rubs() {
+        if contact.has_friction() {
             builds("friction: a pass over contacts in each step".to_owned());
         }
     }
@@ -117,7 +117,7 @@ pub fn explain<const D: usize>(
         (scene.contact.is_some(), "contact (needs [contact])"),
         (criterion.is_some(), "damage and bond breaking (needs `material.critical`)"),
         (scene.output.every.is_some(), "fields of earlier steps (need `output.every`)"),
-        (scene.boundary.iter().any(Boundary::is_prescribed), "prescribed displacements"),
+        (scene.boundary.iter().any(Boundary::prescribes_displacement), "prescribed displacements"),
         (pulled, "body forces"),
         (scene.output.fields, "VTKHDF fields"),
         (scene.output.pictures, "pictures"),
@@ -126,8 +126,7 @@ pub fn explain<const D: usize>(
     .filter_map(|(is_built, name)| (!is_built).then_some(name))
     .collect();
     lines.extend(wrapped_list("leaves out", &left_out));
-    let names: Vec<String> =
-        reports.iter().map(|named| Named::list([named])).collect();
+    let names: Vec<String> = reports.iter().map(|named| Named::list([named])).collect();
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     lines.extend(wrapped_list("reports", &names));
     lines.extend(super::warnings(source, scene, body).into_iter().map(|text| format!("  warning    {text}")));

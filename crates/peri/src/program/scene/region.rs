@@ -1,23 +1,23 @@
-//! Particles that a boundary acts on.
+//! Selects the particles of a boundary.
 
 use super::Boundary;
 use super::build::operations;
-use super::values::{Body, ONE_OF_THEM, check_order, vector};
+use super::values::{DiscreteBody, ONE_OF_THEM, check_order, vector};
 use crate::bonds::Bonds;
 use crate::geometry::inside;
 use harness::scene::{SceneError, Source};
 
-/// Layers of particles at a side that a boundary acts on.
+/// Returns the number of layers of particles that a boundary takes at a side.
 pub(super) fn layers<const D: usize>(boundary: &Boundary, bonds: &dyn Bonds<D>) -> usize {
     boundary.layers_of(bonds.spacing(), bonds.horizon() / bonds.spacing())
 }
 
-/// Particles of the region of a boundary, and its depth at a side, m.
+/// Returns the particles of a boundary, and its depth from a side, m.
 pub(super) fn region<const D: usize>(
     source: &Source,
     key: &str,
     boundary: &Boundary,
-    body: &Body<D>,
+    body: &DiscreteBody<D>,
 ) -> Result<(Vec<u32>, Option<f64>), SceneError> {
     let spacing = body.bonds.spacing();
     let (low, high, depth) = match (boundary.side, &boundary.min, &boundary.max) {
