@@ -1,4 +1,4 @@
-//! What tables of bond forces cannot represent: refused by key, value and reason.
+//! Refuses scenes that tables of bond forces cannot represent.
 
 use crate::program::scene::{Scene, SceneVariant, SolverMethod, SurfaceCorrection};
 use crate::solver::Policy;

@@ -1,4 +1,4 @@
-//! `peri export` and `peri compare`: other engines.
+//! `peri export`, `peri import` and `peri compare`: exchange with other engines.
 
 use crate::program::bridge::{self, BOUND};
 use crate::program::run::PeriFailure;
@@ -7,7 +7,7 @@ use harness::case::terminal::default_output;
 use harness::scene::Source;
 use std::path::PathBuf;
 
-/// What to export to.
+/// Engine to export to.
 #[derive(Subcommand)]
 pub enum ExportCommand {
     /// Write data, bond tables, input, driver and self-check state of a bond law on a lattice.
@@ -17,14 +17,14 @@ pub enum ExportCommand {
         /// Folder for the files; default: out/NAME-lammps.
         #[arg(long, short)]
         output: Option<PathBuf>,
-        /// The variant, of a scene with several.
+        /// Variant of a scene with several.
         #[arg(long, value_name = "NAME")]
         variant: Option<String>,
     },
 }
 
 impl ExportCommand {
-    /// Writes it.
+    /// Writes the files.
     pub fn print(self) -> Result<bool, PeriFailure> {
         let Self::Lammps { scene, output, variant } = self;
         let source = Source::read(&scene)?;
@@ -45,12 +45,12 @@ impl ExportCommand {
     }
 }
 
-/// What to import from.
+/// Engine to import from.
 #[derive(Subcommand)]
 pub enum ImportCommand {
-    /// Read what `drive.py` has written: report, history, curve, fields; judge the scene's expectations.
+    /// Read the results of `drive.py`: report, history, curve, fields; judge the expectations of the scene.
     Lammps {
-        /// The folder that `peri export lammps` has written and `drive.py` has run in.
+        /// Folder of `peri export lammps` in which `drive.py` has run.
         folder: PathBuf,
         /// Folder for the results; default: FOLDER/results.
         #[arg(long, short)]
@@ -59,7 +59,7 @@ pub enum ImportCommand {
 }
 
 impl ImportCommand {
-    /// Reads and judges it.
+    /// Reads and judges the results.
     pub fn print(self) -> Result<bool, PeriFailure> {
         let Self::Lammps { folder, output } = self;
         let output = output.unwrap_or_else(|| folder.join("results"));
@@ -69,21 +69,21 @@ impl ImportCommand {
     }
 }
 
-/// What to compare with.
+/// Engine to compare with.
 #[derive(Subcommand)]
 pub enum CompareCommand {
-    /// Run the self-check state of an export in LAMMPS; exit code 1 where forces differ.
+    /// Run the self-check state of an export in LAMMPS; exit code 1 if forces differ.
     Lammps {
-        /// The folder that `peri export lammps` has written.
+        /// Folder of `peri export lammps`.
         folder: PathBuf,
-        /// A Python with the modules `lammps` and `numpy`; default: `PERI_LAMMPS_PYTHON` of the environment, else `python3`.
+        /// Python with the modules `lammps` and `numpy`; default: $PERI_LAMMPS_PYTHON, else `python3`.
         #[arg(long)]
         python: Option<PathBuf>,
     },
 }
 
 impl CompareCommand {
-    /// Runs and judges it.
+    /// Runs the comparison and judges it.
     pub fn print(self) -> Result<bool, PeriFailure> {
         let Self::Lammps { folder, python } = self;
         let python = python.or_else(|| std::env::var_os("PERI_LAMMPS_PYTHON").map(PathBuf::from));

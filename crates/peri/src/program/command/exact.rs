@@ -1,4 +1,4 @@
-//! `peri exact`: closed forms and law constants on the terminal.
+//! `peri exact`: prints closed forms and constants of laws.
 
 use crate::critical::Interpretation;
 use crate::potential::{Chain, KernelFit, Law};
@@ -6,7 +6,7 @@ use crate::program::run::PeriFailure;
 use crate::{calibrate, exact};
 use clap::Subcommand;
 
-/// What to print.
+/// Closed form to print.
 #[derive(Subcommand)]
 pub enum ExactCommand {
     /// Kirsch's stresses along x = 0 above a hole of radius 1 under unit tension, and the finite-width peak.
@@ -17,7 +17,7 @@ pub enum ExactCommand {
     },
     /// Tension, tangent and energy of a bond law, its force maximum, critical stretches and kernel fit.
     Law {
-        /// The law.
+        /// Bond law.
         #[arg(long, value_enum, default_value_t = Law::ChainOffset)]
         law: Law,
         /// Links per bond n̄.
@@ -38,11 +38,11 @@ pub enum ExactCommand {
     },
 }
 
-/// Far beyond any rubber.
+/// Largest stretch of tables.
 const LARGEST_STRETCH: f64 = 1000.0;
 
 impl ExactCommand {
-    /// Prints it.
+    /// Prints the values.
     pub fn print(self) -> Result<bool, PeriFailure> {
         match self {
             Self::Kirsch { width_ratio } => {

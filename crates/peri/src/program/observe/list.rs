@@ -1,4 +1,4 @@
-//! The observers of a scene.
+//! List of all observers.
 
 use super::moment::{Moment, SceneObservers, StatelessObserver};
 use super::{contact, cracks, exact, flags, frames, history, lines, maps, probes, sections, values};
@@ -8,36 +8,36 @@ use crate::program::scene::Scene;
 use harness::observe::{Observer, Scalars};
 use harness::report::Named;
 
-/// SceneObservers of a scene, which know nothing of its body.
+/// Returns the observers of a scene; they need no body yet.
 pub fn observers<const D: usize>(scene: &Scene) -> SceneObservers<'_, D> {
-    let values = |of| {
-        Box::new(StatelessObserver { scene, ..of }) as Box<dyn for<'m> Observer<Moment<'m, D>, Error> + '_>
+    let stateless = |functions| {
+        Box::new(StatelessObserver { scene, ..functions }) as Box<dyn for<'m> Observer<Moment<'m, D>, Error> + '_>
     };
-    let none = StatelessObserver::none(scene);
+    let none = StatelessObserver::empty(scene);
     vec![
-        values(StatelessObserver { scalars: values::followed, ..none }),
-        values(StatelessObserver { scalars: values::stretches, ..none }),
+        stateless(StatelessObserver { scalars: values::followed_fields, ..none }),
+        stateless(StatelessObserver { scalars: values::stretches, ..none }),
         Box::new(values::FitError::new(scene)),
-        values(StatelessObserver { scalars: cracks::breaking, ..none }),
-        values(StatelessObserver { scalars: values::motion, warnings: values::mixed, ..none }),
-        values(StatelessObserver { scalars: values::responses, ..none }),
-        values(StatelessObserver { scalars: history::scalars, ..none }),
+        stateless(StatelessObserver { scalars: cracks::breaking, ..none }),
+        stateless(StatelessObserver { scalars: values::motion, warnings: values::mixed_warnings, ..none }),
+        stateless(StatelessObserver { scalars: values::responses, ..none }),
+        stateless(StatelessObserver { scalars: history::scalars, ..none }),
         Box::new(cracks::NewCracks::new(scene)),
-        values(StatelessObserver { scalars: contact::scalars, warnings: contact::warnings, ..none }),
-        values(StatelessObserver { scalars: probes::scalars, ..none }),
-        values(StatelessObserver { scalars: flags::scalars, warnings: flags::warnings, ..none }),
+        stateless(StatelessObserver { scalars: contact::scalars, warnings: contact::warnings, ..none }),
+        stateless(StatelessObserver { scalars: probes::scalars, ..none }),
+        stateless(StatelessObserver { scalars: flags::scalars, warnings: flags::warnings, ..none }),
         Box::new(exact::HoleErrors::new(scene)),
         Box::new(sections::Sections(scene)),
         Box::new(lines::LineObserver(scene)),
-        values(StatelessObserver { fields: frames::places, ..none }),
-        values(StatelessObserver { fields: cracks::field, ..none }),
-        values(StatelessObserver { fields: flags::field, ..none }),
-        values(StatelessObserver { fields: frames::stresses, ..none }),
+        stateless(StatelessObserver { fields: frames::displacement_fields, ..none }),
+        stateless(StatelessObserver { fields: cracks::damage_field, ..none }),
+        stateless(StatelessObserver { fields: flags::flag_field, ..none }),
+        stateless(StatelessObserver { fields: frames::stress_fields, ..none }),
         Box::new(maps::Pictures(scene)),
     ]
 }
 
-/// Scalars that a run of a scene without studies can give; some only where something happens (`first_break`).
+/// Returns the scalars that a run of a scene without studies can report; some depend on events, such as `first_break`.
 pub fn quantities(scene: &Scene) -> Vec<Named> {
     match scene.body.space {
         Space::Solid => names(&observers::<3>(scene)),

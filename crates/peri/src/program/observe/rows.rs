@@ -1,4 +1,4 @@
-//! Rows of the history: what a scene's probes are on a body, and the columns of their numbers.
+//! Rows of the history: numbers of probes, flags and sections, and their columns.
 
 use crate::bonds::Bonds;
 use crate::probe::{
@@ -10,19 +10,19 @@ use crate::solver::State;
 use harness::report::Named;
 use harness::scene::{SceneError, Source};
 
-/// Damage of particles at the tip of a crack: less is not torn, more lies behind it.
-const AT_THE_TIP: [f64; 2] = [0.35, 0.9];
-/// Part of the largest velocity that the front of a wave has.
-const AT_THE_FRONT: f64 = 0.02;
+/// Range of damage of particles at a crack tip: less is ahead of it, more behind it.
+const TIP_DAMAGE: [f64; 2] = [0.35, 0.9];
+/// Velocity of a wave front over the largest velocity.
+const FRONT_VELOCITY: f64 = 0.02;
 
-/// Numbers of a body in a state, a part of a row of the history.
+/// Function that computes part of a row of the history from a state.
 pub type RowPart<const D: usize> =
     Box<dyn Fn(&dyn Bonds<D>, &State<D>, &StressEvaluator<D>) -> Vec<f64> + Send + Sync>;
 
-/// Parts of a row: of probes, of the flags of a learnt law, of sections.
+/// Returns the parts of a row: probes, flags of a learnt law, sections.
 ///
 /// # Errors
-/// Regions without particles, marks outside the body, sections that no bond crosses.
+/// Regions without particles, marks outside the body, sections without bonds across them.
 pub(super) fn rows<const D: usize>(
     source: &Source,
     scene: &Scene,
@@ -46,7 +46,7 @@ pub(super) fn rows<const D: usize>(
     probes.chain([Ok(flags)]).chain(sections).collect()
 }
 
-/// A probe on a body: one number, two of a crack.
+/// Builds a probe: one number, for a crack two.
 fn probe<const D: usize>(
     source: &Source,
     key: &str,
@@ -72,14 +72,14 @@ fn probe<const D: usize>(
             let tip = CrackTip {
                 sites: sites()?,
                 whole: (0..bonds.sites()).map(|site| bonds.bonded(site)).collect(),
-                damage: spec.damage.unwrap_or(AT_THE_TIP),
+                damage: spec.damage.unwrap_or(TIP_DAMAGE),
                 axis,
                 across: spec.across.map(|across| across.index()),
             };
             Box::new(move |bonds, _, _| tip.value(bonds).to_vec())
         }
         Track::Front => {
-            let front = WaveFront::new(bonds, sites()?, axis, spec.threshold.unwrap_or(AT_THE_FRONT));
+            let front = WaveFront::new(bonds, sites()?, axis, spec.threshold.unwrap_or(FRONT_VELOCITY));
             Box::new(move |_, state, _| vec![front.value(state)])
         }
         Track::JIntegral => {
@@ -91,12 +91,12 @@ fn probe<const D: usize>(
     })
 }
 
-/// Numbers of a probe in a row.
+/// Returns the count of numbers of a probe in a row.
 pub(super) fn width(probe: &HistoryProbe) -> usize {
     1 + usize::from(probe.track == Track::Crack)
 }
 
-/// Columns of probes and flags in the table of the history, with their units.
+/// Returns the columns of probes and flags in the history, with units.
 pub fn columns(scene: &Scene) -> Vec<(String, String)> {
     let each = |probe: &HistoryProbe| {
         let own = (probe.name.clone(), probe.track.unit().to_owned());

@@ -1,4 +1,4 @@
-//! A whole scene: every variant solved, measured, compared, drawn and judged; restartable at any moment.
+//! Runs a scene: solves every variant, compares, draws and judges; resumable from checkpoints.
 
 mod compare;
 mod draw;
@@ -28,22 +28,22 @@ use polycore::memory::available;
 use std::cell::RefCell;
 use std::path::Path;
 
-/// What stops a run: a fault in the scene, or one on the way.
+/// Error of a run: an invalid scene, or a failure while solving.
 pub type PeriFailure = harness::scene::Failure<Error>;
 
-/// Particles of a body from which on its own loops keep all threads busy: such variants are solved one after another.
-const LARGE: usize = 100_000;
+/// Particles of a body whose loops keep all threads busy: larger variants are solved one after another.
+const LARGE_BODY: usize = 100_000;
 
-/// A finished run.
+/// Finished run of a scene.
 pub struct FinishedScene {
-    /// As written to `report.json`.
+    /// Report, as in `report.json`.
     pub report: Report,
-    /// The variants, in the order they ran.
+    /// Results of the variants, in their order.
     pub outcomes: Vec<VariantOutcome>,
 }
 
 impl FinishedScene {
-    /// For the terminal: all values of a single variant, a line for each of several, then the judged expectations.
+    /// Returns the summary for the terminal: all values of a single variant or a line per variant, then the verdicts.
     pub fn summary(&self) -> String {
         let notes = compare::notes(&self.outcomes);
         if self.outcomes.len() == 1 {
@@ -57,10 +57,10 @@ impl FinishedScene {
     }
 }
 
-/// Runs a scene in its dimension, all but `report.json`, which [`Run::finish`] writes.
+/// Runs a scene and writes all files but `report.json`, which [`Run::finish`] writes.
 ///
 /// # Errors
-/// [`PeriFailure`]; nothing half-written remains, and an interrupted run can be resumed.
+/// [`PeriFailure`]; no file is half-written, and an interrupted run can be resumed.
 pub fn run(source: &Source, scene: &Scene, run: &mut Run) -> Result<FinishedScene, PeriFailure> {
     match scene.body.space {
         Space::Solid => run_in::<3>(source, scene, run),
@@ -75,7 +75,7 @@ fn run_in<const D: usize>(
 ) -> Result<FinishedScene, PeriFailure> {
     let (output, quick) = (run.options.output, run.options.quick);
     let variants = observe::check(source, scene, quick)?;
-    // every body is built once before anything is computed or written: faults show at once
+    // every body is built once before anything is computed or written, so that errors show at once
     let (mut largest, mut memory) = (0, f64::MIN_POSITIVE);
     for variant in variants.iter().filter(|variant| variant.of.expect_error.is_none()) {
         let (source, scene) = variant.resolved();
@@ -84,9 +84,9 @@ fn run_in<const D: usize>(
         memory = memory.max(scene::memory_needed(scene, &*bonds));
     }
     run.begin()?;
-    // one after another where steps are watched and where errors are drawn against run times
+    // one after another if steps are observed or run times are compared
     let timed = scene.exact.is_some() || scene.output.compare.is_some();
-    let alone = run.options.on_step.is_some() || timed || largest > LARGE;
+    let alone = run.options.on_step.is_some() || timed || largest > LARGE_BODY;
     let fitting = (available() / memory) as usize;
     let at_once = if alone { 1 } else { rayon::current_num_threads().min(fitting).max(1) };
     let names: Vec<String> = variants.iter().map(SceneVariant::name).collect();
@@ -102,7 +102,7 @@ fn run_in<const D: usize>(
             })
             .and_then(|(outcome, ended)| match ended {
                 Some(error) if expected.is_none_or(|text| !error.to_string().contains(text)) => {
-                    kept((source, scene, quick), outcome, &error, output)?;
+                    write_failed((source, scene, quick), outcome, &error, output)?;
                     Err(PeriFailure::Run(error))
                 }
                 _ => Ok(outcome),
@@ -128,13 +128,13 @@ fn run_in<const D: usize>(
     compare::write(&finished, output)?;
     compare::suite(&mut report, &finished, output)?;
     if scene.output.pictures {
-        draw::curves(scene, &finished, output)?;
+        draw::draw_curves(scene, &finished, output)?;
     }
     Ok(FinishedScene { report, outcomes: finished })
 }
 
-/// Writes what there is of a variant that ended in an error: its history, its values, and a report that has not passed.
-fn kept(
+/// Writes the history, values and failed report of a variant that ended in an error.
+fn write_failed(
     (source, scene, quick): (&Source, &Scene, bool),
     outcome: VariantOutcome,
     error: &Error,
@@ -153,7 +153,7 @@ fn run_variant<const D: usize>(
     scene: &Scene,
     variant: &SceneVariant,
     output: &Path,
-    under_way: &VariantRun,
+    variant_run: &VariantRun,
     state: Option<State<D>>,
 ) -> Result<(VariantOutcome, Option<Error>), PeriFailure> {
     let phases = RefCell::new(Phases::new());
@@ -166,13 +166,13 @@ fn run_variant<const D: usize>(
     outcome.warnings = scene::warnings(source, scene, &body);
     outcome.warnings.extend(scene::tearing_warnings(scene, &body, physics.body.toughness.as_ref()));
     outcome.snaps_back = scene.solver.snap_back;
-    let mut state = begin((source, scene), &body, state, output)?;
+    let mut state = initial_state((source, scene), &body, state, output)?;
     let mut observers = observe::observers::<D>(scene);
     let mut frames = FieldFrames::new(scene, &state, &output.join(physics.field_file()))?;
     let ended = match solve(
         (source, scene),
         &physics,
-        under_way,
+        variant_run,
         &mut body,
         &mut state,
         &phases,
@@ -184,7 +184,7 @@ fn run_variant<const D: usize>(
         other => other.map(|()| None)?,
     };
     if let Some(error) = &ended {
-        // the last equilibrium has bonds that are broken by now
+        // bonds of the last equilibrium have broken since
         body = Physics::<D>::new(source, scene, variant)?.0;
         state.fracture.restore(&mut *body.bonds)?;
         outcome.error = Some(error.to_string());
@@ -203,7 +203,7 @@ fn run_variant<const D: usize>(
         outcome.profiles.extend(observer.curves(&moment).into_iter().filter_map(Profile::from_curve));
     }
     phases.borrow_mut().stop();
-    outcome.work_of(&*body.bonds, &state);
+    outcome.record_work(&*body.bonds, &state);
     outcome.history.clone_from(&state.history);
     outcome.events.clone_from(&state.fracture.events);
     outcome.fragments = moment.fragments().to_vec();
@@ -211,15 +211,15 @@ fn run_variant<const D: usize>(
     let planes = scene.contact.iter().flat_map(|contact| contact.plane.iter().enumerate());
     outcome.planes = planes.map(|(index, plane)| plane.name(index)).collect();
     outcome.probes = observe::columns(scene);
-    outcome.seconds(&phases.borrow());
+    outcome.record_seconds(&phases.borrow());
     frames.finish(&observers, &moment)?;
     let outputs = Outputs { folder: output, pictures: scene.output.pictures };
     observers.iter().try_for_each(|observer| observer.write(&moment, &outputs))?;
     Ok((outcome, ended))
 }
 
-/// The state from which a variant is solved: the undeformed body, unless the checkpoint has one.
-fn begin<const D: usize>(
+/// Returns the initial state of a variant: that of the checkpoint, else the undeformed body.
+fn initial_state<const D: usize>(
     (source, scene): (&Source, &Scene),
     body: &scene::DiscreteBody<D>,
     state: Option<State<D>>,
@@ -234,7 +234,7 @@ fn begin<const D: usize>(
         return Ok(state);
     };
     if state.displacement.sites() != sites {
-        let why = format!("it has {} particles' sites, the body now has {sites}", state.displacement.sites());
+        let why = format!("it has {} sites, the body now has {sites}", state.displacement.sites());
         let path = output.join(harness::checkpoint::FILE_NAME);
         return Err(polycore::Error::Checkpoint { path, why }.into());
     }
@@ -244,7 +244,7 @@ fn begin<const D: usize>(
 fn solve<const D: usize>(
     (source, scene): (&Source, &Scene),
     physics: &Physics<D>,
-    under_way: &VariantRun,
+    variant_run: &VariantRun,
     body: &mut scene::DiscreteBody<D>,
     state: &mut State<D>,
     phases: &RefCell<Phases>,
@@ -252,7 +252,7 @@ fn solve<const D: usize>(
 ) -> Result<(), PeriFailure> {
     let (material, loads) = (&physics.body.material, &physics.loads);
     let factors = scene.solver.factors();
-    let mut watch = |status: &Status, state: &State<D>| under_way.watch(status, state);
+    let mut watch = |status: &Status, state: &State<D>| variant_run.watch(status, state);
     let contact = match &scene.contact {
         Some(contact) => {
             let planes = contact.planes(source, scene.dynamics.is_some()).map_err(PeriFailure::from)?;
@@ -284,7 +284,7 @@ fn solve<const D: usize>(
         observers.iter_mut().try_for_each(|observer| observer.see(&moment))?;
         frames.step(observers, &moment)?;
         if state.control.round == 0 {
-            under_way.step(|| seen(bonds, state));
+            variant_run.step(|| step_data(bonds, state));
         }
         phases.borrow_mut().start("solve");
         Ok(())
@@ -297,8 +297,8 @@ fn solve<const D: usize>(
     Ok(solved?)
 }
 
-/// A finished step, as who watches the run sees it: positions and displacements in three components.
-fn seen<const D: usize>(bonds: &dyn Bonds<D>, state: &State<D>) -> Step {
+/// Returns the data of a finished step for a callback: positions and displacements in three components.
+fn step_data<const D: usize>(bonds: &dyn Bonds<D>, state: &State<D>) -> Step {
     let Some(record) = state.history.last() else { return Step::default() };
     let of_particles = |name, get: &dyn Fn(usize) -> [f64; D]| {
         let each = bonds.particles().iter().flat_map(|&site| in_space(get(site as usize)));
@@ -313,25 +313,25 @@ fn seen<const D: usize>(bonds: &dyn Bonds<D>, state: &State<D>) -> Step {
     }
 }
 
-/// An iteration in a line.
-fn line_of(status: &Status) -> String {
+/// Formats the progress line of an iteration.
+fn progress_line(status: &Status) -> String {
     let Status { step, steps, iteration, residual, load, broken, .. } = *status;
     let broken = if broken > 0 { format!("  broken {broken}") } else { String::new() };
     let load = load.map_or(String::new(), |load| format!("  load {load:.4e} N before"));
     format!("step {}/{steps}{broken}  iteration {iteration}  residual {residual:.2e}{load}", step + 1)
 }
 
-/// The part of a variant that is done, 0 to 1: residuals fall by powers of ten.
-fn part_of(status: &Status) -> f64 {
+/// Returns the finished fraction of a variant, 0 to 1, from the logarithm of the residual.
+fn finished_fraction(status: &Status) -> f64 {
     let decades = (1.0 / status.tolerance).log10();
     let done = (-status.residual.log10()).clamp(0.0, decades) / decades;
     (status.step as f64 + done) / status.steps as f64
 }
 
-/// What a scene builds and leaves out, variant by variant.
+/// Lists what a scene builds and leaves out, by variant.
 ///
 /// # Errors
-/// A fault of the scene.
+/// An invalid scene.
 pub fn explanation(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<String>, PeriFailure> {
     match scene.body.space {
         Space::Solid => explanation_in::<3>(source, scene, quick),
