@@ -13,7 +13,7 @@ use peri::field::Field;
 use peri::material::{
     Correspondence, Deformation, Material, NonlocalSolid, PointLaw, Pointwise, Response, Tensor,
 };
-use peri::program::run::{Finished, Peri, run};
+use peri::program::run::{FinishedScene, Peri, run};
 use peri::program::scene::{self, Scene};
 use polycore::constitutive::network::Activation::Softplus;
 use polycore::constitutive::surrogate::{Header, Kind, Softening, Surrogate, Symmetry};
@@ -169,7 +169,7 @@ shapes = [{{ add = \"box\", min = [\"0 mm\", \"0 mm\"], max = [\"16 mm\", \"6 mm
     )
 }
 
-fn solve(text: &str, output: &Path) -> Finished {
+fn solve(text: &str, output: &Path) -> FinishedScene {
     let source = Source::new("scene.toml", text);
     let scene = source.parse::<Scene>().unwrap_or_else(|error| panic!("{}", error.render()));
     let mut own = Run::new(const { &Peri::PROGRAM }, &source, Options::new(output));

@@ -2,20 +2,20 @@
 
 use harness::case::{Case, Options, Run};
 use harness::scene::Source;
-use peri::program::run::{Finished, Peri, run};
+use peri::program::run::{FinishedScene, Peri, run};
 use peri::program::scene::Scene;
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-fn solve(text: &str, output: &Path) -> Finished {
+fn solve(text: &str, output: &Path) -> FinishedScene {
     let source = Source::new("scene.toml", text);
     let scene = source.parse::<Scene>().unwrap_or_else(|error| panic!("{}", error.render()));
     let mut own = Run::new(const { &Peri::PROGRAM }, &source, Options::new(output));
     run(&source, &scene, &mut own).unwrap_or_else(|error| panic!("{error}"))
 }
 
-fn value(finished: &Finished, name: &str) -> f64 {
+fn value(finished: &FinishedScene, name: &str) -> f64 {
     finished.report.scalar(name).unwrap_or_else(|| panic!("no {name} in\n{}", finished.report.table()))
 }
 

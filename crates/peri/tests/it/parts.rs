@@ -9,10 +9,10 @@ use peri::bonds::{
 };
 use peri::geometry::{Cut, Gaps, Operation, Shape, lattice};
 use peri::model::Body;
-use peri::program::run::{Finished, Peri, run};
+use peri::program::run::{FinishedScene, Peri, run};
 use peri::program::scene::Scene;
 
-fn solve(text: &str) -> Finished {
+fn solve(text: &str) -> FinishedScene {
     let directory = tempfile::tempdir().unwrap();
     let source =
         Source::new("scene.toml", text.to_owned() + "\n[output]\nfields = false\npictures = false\n");
@@ -21,7 +21,7 @@ fn solve(text: &str) -> Finished {
     run(&source, &scene, &mut own).unwrap_or_else(|error| panic!("{error}"))
 }
 
-fn value(finished: &Finished, name: &str) -> f64 {
+fn value(finished: &FinishedScene, name: &str) -> f64 {
     finished.report.scalar(name).unwrap_or_else(|| panic!("no {name} in\n{}", finished.report.table()))
 }
 
@@ -217,7 +217,7 @@ fn a_block_between_plates_is_pressed_when_gaps_close() {
     assert!(check(&bonded).contains("1 and 2 are bonded across a gap by"), "{}", check(&bonded));
 }
 
-fn layered(shape: &str, more: &str) -> Finished {
+fn layered(shape: &str, more: &str) -> FinishedScene {
     solve(&format!(
         r#"version = 1
 program = "peri"

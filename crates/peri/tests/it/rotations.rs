@@ -7,12 +7,12 @@ use peri::bonds::stretch_range;
 use peri::geometry::Shape;
 use peri::model::{Body, Model, Rubber};
 use peri::potential::Law;
-use peri::program::run::{Finished, Peri, run};
+use peri::program::run::{FinishedScene, Peri, run};
 use peri::program::scene::Scene;
 use peri::solver::{DynamicRelaxation, Lbfgs, Rotation, VelocityVerlet};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, PI, TAU};
 
-fn solve(text: &str) -> Finished {
+fn solve(text: &str) -> FinishedScene {
     let directory = tempfile::tempdir().unwrap();
     let source = Source::new("scene.toml", text);
     let scene = source.parse::<Scene>().unwrap_or_else(|error| panic!("{}", error.render()));
@@ -20,7 +20,7 @@ fn solve(text: &str) -> Finished {
     run(&source, &scene, &mut own).unwrap_or_else(|error| panic!("{error}"))
 }
 
-fn value(finished: &Finished, name: &str) -> f64 {
+fn value(finished: &FinishedScene, name: &str) -> f64 {
     finished.report.scalar(name).unwrap_or_else(|| panic!("no {name} in\n{}", finished.report.table()))
 }
 

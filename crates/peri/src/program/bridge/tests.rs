@@ -1,4 +1,4 @@
-use super::{Model, export, import};
+use super::{LammpsModel, export, import};
 use crate::bonds::{self, BodyGeometry, BondDamage, BondForces, LatticeBonds, VolumeCorrection};
 use crate::field::Field;
 use crate::geometry::{Operation, Shape, lattice};
@@ -27,7 +27,7 @@ fn law() -> Box<dyn BondPotential> {
 #[test]
 fn exported_bonds_are_those_of_the_kernel() {
     let ((mut body, loads), law, modulus) = (strip(), law(), 3e12);
-    let model = Model::new(&body, &*law, modulus, Some(2.5), &loads);
+    let model = LammpsModel::new(&body, &*law, modulus, Some(2.5), &loads);
     assert_eq!(2 * model.bonds.len() as u64, body.directed_bonds());
     assert_eq!(model.types.len(), 6);
     assert_eq!(model.clamps.len(), 2);
@@ -58,7 +58,7 @@ fn exported_bonds_are_those_of_the_kernel() {
 fn tables_hold_the_law() {
     let ((body, loads), law) = (strip(), law());
     let critical = 2.5;
-    let model = Model::new(&body, &*law, 3e12, Some(critical), &loads);
+    let model = LammpsModel::new(&body, &*law, 3e12, Some(critical), &loads);
     let (points, mut text) = (model.points(), Vec::new());
     model.tables(points, &mut text).unwrap();
     let text = String::from_utf8(text).unwrap();
