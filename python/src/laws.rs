@@ -150,7 +150,7 @@ impl Law {
     }
 
     /// Computes W, (N, 1), P, σ or S, (N, 9), at each F, (N, 9).
-    fn of_gradient<'py>(
+    fn at_gradient<'py>(
         &self,
         py: Python<'py>,
         what: &str,
