@@ -2,7 +2,7 @@
 
 use super::{Description, Language, Model, check_name, numbers, refuse_history};
 use crate::Error;
-use crate::surrogate::{Surrogate, UNSEEN};
+use crate::surrogate::{CONSTANT_TOLERANCE, Surrogate};
 use std::fmt::Write;
 
 /// Bytes of working memory on the stack that an exported law may need.
@@ -70,7 +70,7 @@ fn data(text: &mut String, law: &Description) {
     let limit = law.spread_limit.map_or("HUGE_VAL".to_owned(), |limit| format!("{limit:e}"));
     let _ = writeln!(
         text,
-        "#define SPREAD_LIMIT {limit}\n#define UNSEEN {UNSEEN:e}\n#define FARTHEST {:e}",
+        "#define SPREAD_LIMIT {limit}\n#define UNSEEN {CONSTANT_TOLERANCE:e}\n#define FARTHEST {:e}",
         law.farthest
     );
     for (name, values) in [("width", &law.widths), ("activation", &law.activations)] {

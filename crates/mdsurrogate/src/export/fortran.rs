@@ -3,7 +3,7 @@
 
 use super::{Language, Model, check_name};
 use crate::Error;
-use crate::surrogate::{Surrogate, UNSEEN};
+use crate::surrogate::{CONSTANT_TOLERANCE, Surrogate};
 use std::fmt::Write;
 
 /// Numbers a line and lines a statement: below the 132 columns and 255 continuations of the standard.
@@ -42,7 +42,7 @@ pub fn fortran_source(model: &Surrogate, name: &str) -> Result<String, Error> {
     }
     for (name, value) in [
         ("SPREAD_LIMIT", law.spread_limit.unwrap_or(f64::MAX)),
-        ("UNSEEN", UNSEEN),
+        ("UNSEEN", CONSTANT_TOLERANCE),
         ("FARTHEST", law.farthest),
         ("GREATEST_SEEN", softening.map_or(1.0, |softening| softening.greatest)),
     ] {

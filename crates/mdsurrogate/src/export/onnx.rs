@@ -4,7 +4,7 @@ use super::graph::{BOOLEAN, Builder, refs};
 use super::protobuf::{Dimension, Graph, Model as File, OperatorSet, Shape, TensorType, Type, ValueInfo};
 use super::{Model, refuse_history};
 use crate::Error;
-use crate::surrogate::{Kind, Surrogate, UNSEEN, derivative};
+use crate::surrogate::{CONSTANT_TOLERANCE, Kind, Surrogate, derivative};
 use prost::Message;
 
 /// The operator set, and the version of the format that came with it.
@@ -383,7 +383,7 @@ impl Model<'_> {
     }
 
     fn box_flags(&self, graph: &mut Builder) {
-        let slack = |[low, high]: &[f64; 2]| if low == high { UNSEEN } else { 0.0 };
+        let slack = |[low, high]: &[f64; 2]| if low == high { CONSTANT_TOLERANCE } else { 0.0 };
         let limits = &self.header.training_box;
         let low: Vec<f64> = limits.iter().map(|limit| limit[0] - slack(limit)).collect();
         let high: Vec<f64> = limits.iter().map(|limit| limit[1] + slack(limit)).collect();

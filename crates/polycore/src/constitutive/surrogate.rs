@@ -45,7 +45,7 @@ use nalgebra::SVector;
 use support::Nearest;
 
 /// Tolerance for components that never changed in the training data: ten times the rounding of f32.
-pub const UNSEEN: f64 = 1e-6;
+pub const CONSTANT_TOLERANCE: f64 = 1e-6;
 
 /// Law C → S in one of two precisions.
 #[derive(Debug, Clone)]
@@ -284,7 +284,7 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         for (a, [low, high]) in self.header.training_box.iter().enumerate() {
             let value = c[a].to_f64();
             // components that never changed may differ by rounding; NaN is outside
-            let slack = if low == high { UNSEEN } else { 0.0 };
+            let slack = if low == high { CONSTANT_TOLERANCE } else { 0.0 };
             flags.outside[a] = !(value >= low - slack && value <= high + slack);
             flags.unseen[a] = flags.outside[a] && low == high;
         }
