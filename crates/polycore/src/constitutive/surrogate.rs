@@ -373,7 +373,7 @@ fn product<T: Real>(row: &[T; 6], c: &[T; 6]) -> T {
 }
 
 /// Tᵀ g and Tᵀ H T: derivatives with respect to c from those with respect to T c.
-fn back<T: Real>(turn: &[[T; 6]; 6], g: &[T; 6], h: &[[T; 6]; 6]) -> ([T; 6], [[T; 6]; 6]) {
+fn to_data_axes<T: Real>(turn: &[[T; 6]; 6], g: &[T; 6], h: &[[T; 6]; 6]) -> ([T; 6], [[T; 6]; 6]) {
     let (mut first, mut half, mut second) = ([T::ZERO; 6], [[T::ZERO; 6]; 6], [[T::ZERO; 6]; 6]);
     for k in 0..6 {
         for a in 0..6 {

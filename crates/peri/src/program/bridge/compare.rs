@@ -26,11 +26,11 @@ pub fn compare(folder: &Path, python: &Path) -> Result<Vec<Comparison>, Error> {
     // it runs in the folder, where a relative path would lead elsewhere
     let python = match python.components().count() {
         1 => of_environment(python, std::env::var_os("VIRTUAL_ENV"), std::env::var_os("PATH")),
-        _ => std::path::absolute(python).map_err(Shared::io("find", python))?,
+        _ => std::path::absolute(python).map_err(Shared::from_io("find", python))?,
     };
     let python = &*python;
     let table = folder.join("check.csv");
-    let text = std::fs::read_to_string(&table).map_err(Shared::io("read", &table))?;
+    let text = std::fs::read_to_string(&table).map_err(Shared::from_io("read", &table))?;
     let own = forces(&table, text.lines().skip(1), ',', 4)?;
     let mut found = vec![on(folder, python, None, &own)?];
     if let Some(mpiexec) = mpiexec(python) {
@@ -55,7 +55,7 @@ fn on(folder: &Path, python: &Path, mpiexec: Option<&Path>, own: &[[f64; 3]]) ->
     let path = folder.join(&name);
     // a dump of an earlier run would be compared in place of a missing one
     if path.exists() {
-        std::fs::remove_file(&path).map_err(Shared::io("remove", &path))?;
+        std::fs::remove_file(&path).map_err(Shared::from_io("remove", &path))?;
     }
     let mut command = match mpiexec {
         Some(mpiexec) => {
@@ -69,14 +69,14 @@ fn on(folder: &Path, python: &Path, mpiexec: Option<&Path>, own: &[[f64; 3]]) ->
         command.env("LD_LIBRARY_PATH", libraries);
     }
     let run = command.args(["drive.py", "--check", &name]).current_dir(folder).output();
-    let run = run.map_err(Shared::io("run", mpiexec.unwrap_or(python)))?;
+    let run = run.map_err(Shared::from_io("run", mpiexec.unwrap_or(python)))?;
     if !run.status.success() || !path.exists() {
         let said = String::from_utf8_lossy(&run.stderr);
         let last = said.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or("no word").to_owned();
         let reason = format!("{} with {} rank(s): {last}", run.status, ranks);
         return Err(Shared::Data { what: "LAMMPS".into(), reason }.into());
     }
-    let text = std::fs::read_to_string(&path).map_err(Shared::io("read", &path))?;
+    let text = std::fs::read_to_string(&path).map_err(Shared::from_io("read", &path))?;
     let theirs = forces(&path, text.lines().skip(9), ' ', 5)?;
     if theirs.len() != own.len() {
         let reason = format!("{} particles, the self-check state has {}", theirs.len(), own.len());
