@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use std::sync::atomic::Ordering;
 
 /// Least number of values that are distributed to threads.
-const MANY: usize = 1 << 14;
+const PARALLEL_FROM: usize = 1 << 14;
 
 /// Number of values that a thread computes at once.
 const CHUNK: usize = 1 << 12;
@@ -48,7 +48,7 @@ pub fn langevin<'py>(
 }
 
 fn evaluate(x: &[f64], function: impl Fn(f64) -> f64 + Sync) -> Vec<f64> {
-    if x.len() < MANY {
+    if x.len() < PARALLEL_FROM {
         return x.iter().map(|&x| function(x)).collect();
     }
     x.par_iter().with_min_len(CHUNK).map(|&x| function(x)).collect()
@@ -150,7 +150,7 @@ impl Law {
     }
 
     /// Computes W, (N, 1), P, σ or S, (N, 9), at each F, (N, 9).
-    fn of_gradient<'py>(
+    fn at_gradient<'py>(
         &self,
         py: Python<'py>,
         what: &str,

@@ -21,9 +21,9 @@ mod points;
 mod scenes;
 
 /// Mutations of each kind, unless `FRONT_DOOR` says otherwise.
-const FEW: u32 = 2000;
+const MUTATIONS: u32 = 2000;
 /// Time limit of each mutation, on a busy machine.
-const PATIENCE: Duration = Duration::from_secs(5);
+const TIME_LIMIT: Duration = Duration::from_secs(5);
 /// Memory that opening a file may take: a constant, and a multiple of its length.
 const MEMORY: [u64; 2] = [32 << 20, 256];
 /// Bytes taken of a larger file.
@@ -161,7 +161,7 @@ fn attack_some(
     assert!(!corpus.is_empty(), "{kind}");
     let asked = std::env::var("FRONT_DOOR").ok().map(|count| count.parse().expect("FRONT_DOOR, a count"));
     let config = Config {
-        cases: asked.unwrap_or(FEW).div_ceil(share),
+        cases: asked.unwrap_or(MUTATIONS).div_ceil(share),
         source_file: Some(file!()),
         ..Config::default()
     };
@@ -175,7 +175,7 @@ fn attack_some(
         changes.iter().for_each(|change| apply(&mut bytes, change));
         let begun = Instant::now();
         let (opened, memory) = allocations::most(|| open(&bytes));
-        prop_assert!(begun.elapsed() < PATIENCE, "{:?}", begun.elapsed());
+        prop_assert!(begun.elapsed() < TIME_LIMIT, "{:?}", begun.elapsed());
         let allowed = MEMORY[0] + MEMORY[1] * bytes.len() as u64;
         prop_assert!(memory <= allowed, "{memory} bytes of memory, {allowed} allowed");
         match opened {

@@ -12,7 +12,7 @@ pub const PACKAGES: [&str; 7] =
     ["crystfem", "mdsurrogate", "peri", "polycore", "polycore-cli", "polymech", "xtask"];
 
 /// Time limit of each program, on a busy machine.
-const PATIENCE: Duration = Duration::from_secs(240);
+const TIME_LIMIT: Duration = Duration::from_secs(240);
 
 /// Output of a program.
 #[derive(Debug)]
@@ -79,14 +79,14 @@ pub fn finish(mut child: Child) -> Ended {
         if let Some(status) = child.try_wait().unwrap() {
             break status;
         }
-        if begun.elapsed() > PATIENCE {
+        if begun.elapsed() > TIME_LIMIT {
             child.kill().unwrap();
         }
         std::thread::sleep(pause);
         pause = (2 * pause).min(Duration::from_millis(20));
     };
     let ended = Ended { code: status.code(), stdout: stdout.join().unwrap(), stderr: stderr.join().unwrap() };
-    assert!(begun.elapsed() <= PATIENCE, "no end within {PATIENCE:?}: {ended:?}");
+    assert!(begun.elapsed() <= TIME_LIMIT, "no end within {TIME_LIMIT:?}: {ended:?}");
     assert!(!ended.stderr.contains("panicked") && ended.code != Some(101), "a panic:\n{}", ended.stderr);
     ended
 }

@@ -47,7 +47,7 @@ pictures = false
 "#;
 
 /// Largest size of a page, bytes: longer ones load slowly and cannot be mailed.
-const MOST: usize = 5_000_000;
+const LARGEST_PAGE: usize = 5_000_000;
 
 fn run(program: &str, arguments: &str, here: &Path) -> Ended {
     finish(command(program, arguments, here).spawn().unwrap())
@@ -85,7 +85,7 @@ fn a_sheet_that_tears() {
     let ended = peri("view out", here).with_code(0);
     ended.shows("view.html: open it in a browser");
     let page = fs::read_to_string(here.join("out/view.html")).unwrap();
-    assert!(page.len() < MOST, "{} characters", page.len());
+    assert!(page.len() < LARGEST_PAGE, "{} characters", page.len());
     let told = page_data(&page);
     let body = &told["bodies"][0];
     let frames = body["frames"].as_array().unwrap();
@@ -176,7 +176,7 @@ fn a_print_on_a_small_screen() {
     run("crystfem", "run bar.toml --output out", here).with_code(0);
     run("crystfem", "view out --html page.html", here).with_code(0).shows("page.html");
     let page = fs::read_to_string(here.join("page.html")).unwrap();
-    assert!(page.len() < MOST && !here.join("out/view.html").exists(), "{}", page.len());
+    assert!(page.len() < LARGEST_PAGE && !here.join("out/view.html").exists(), "{}", page.len());
     let Some(browser) = Browser::open(&here.join("page.html"), [420, 860]) else { return };
     browser.wait("document.body.dataset.ready");
     browser.picture("print-end.txt");

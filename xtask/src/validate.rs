@@ -19,7 +19,7 @@ mod execute;
 use execute::{Settings, run_case};
 
 /// Number of lines of a failed case's output that are shown.
-const TAIL: usize = 30;
+const SHOWN_LINES: usize = 30;
 
 /// Options of `validate`.
 #[derive(clap::Args)]
@@ -213,7 +213,7 @@ fn name(cases: &Path, file: &Path) -> String {
 fn show_tail(log: &Path) {
     let text = fs::read_to_string(log).unwrap_or_default();
     let lines: Vec<&str> = text.lines().collect();
-    for line in &lines[lines.len().saturating_sub(TAIL)..] {
+    for line in &lines[lines.len().saturating_sub(SHOWN_LINES)..] {
         eprintln!("    {line}");
     }
 }

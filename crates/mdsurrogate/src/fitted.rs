@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::dataset::DataRow;
 use crate::network::{Architecture, LANES};
-use crate::surrogate::{Features, Header, Kind, Support, Surrogate, UNSEEN};
+use crate::surrogate::{CONSTANT_TOLERANCE, Features, Header, Kind, Support, Surrogate};
 use nalgebra::Vector3;
 use polycore::numerics::range;
 use polycore::tensor::{Tensor, Voigt, voigt};
@@ -105,7 +105,7 @@ fn equivalents(kind: &Kind, rows: &[&DataRow]) -> Vec<Voigt> {
             let axis = Vector3::from(axes[axis]);
             let turn = 2.0 * axis * axis.transpose() - Tensor::identity();
             let turned = |c: &Voigt| voigt::from_stress(&(turn * voigt::to_stress(c) * turn.transpose()));
-            if own.iter().any(|c| (turned(c) - c).norm() > UNSEEN) {
+            if own.iter().any(|c| (turned(c) - c).norm() > CONSTANT_TOLERANCE) {
                 all.extend(own.iter().map(turned));
             }
         }

@@ -8,10 +8,10 @@ use std::ops::Deref;
 use std::path::Path;
 
 /// Largest ratio of deflate compression (Deutsch 1996, RFC 1951: 258 bytes in two bits).
-const BEST_PACKING: f64 = 1032.0;
+const BEST_COMPRESSION: f64 = 1032.0;
 /// Size that a dataset or a chunk may always have, bytes: a chunk keeps its size when only a corner of it is
 /// used.
-const ALWAYS: f64 = (4 << 20) as f64;
+const ALWAYS_ALLOWED: f64 = (4 << 20) as f64;
 
 /// Opens a dataset of a file of `file_bytes`, if the file can hold the size that the dataset claims.
 ///
@@ -25,7 +25,7 @@ pub fn dataset(file: &H5File, name: &str, file_bytes: u64) -> Result<H5Dataset, 
     let bytes = |sizes: &[usize]| {
         sizes.iter().map(|&size| size as f64).product::<f64>() * dataset.element_size() as f64
     };
-    let most = BEST_PACKING * file_bytes as f64 + ALWAYS;
+    let most = BEST_COMPRESSION * file_bytes as f64 + ALWAYS_ALLOWED;
     let chunk = dataset.chunk_dims().unwrap_or_default();
     let needed = bytes(&dataset.shape()).max(bytes(&chunk));
     if needed > most {

@@ -29,15 +29,15 @@ pub struct Dissipation {
     pub viscous: f64,
 }
 
-/// Elastic strains of a branch.
-const SIX: usize = 6;
+/// Number of strain components of a branch.
+const COMPONENTS: usize = 6;
 
 impl Print {
     /// Name in the input of a host, without `USER_`.
     pub const NAME: &'static str = "printed-pa12";
     /// Number of state variables: z, α, T (K), the total strain at the end (6), and the elastic strains of
     /// the branches (6 × 6); all 0 at birth.
-    pub const STATES: usize = 9 + 6 * SIX;
+    pub const STATES: usize = 9 + 6 * COMPONENTS;
 
     /// Creates the body from its constants: column of Table 4.1 (1 or 2), absolute zero (0 in kelvin, 273.15
     /// in °C), temperature at birth in the host's degrees (zero strain), crystallinity X∞ at α = 1, and the
@@ -92,19 +92,19 @@ impl Print {
         let before = Voigt::from_column_slice(&state[3..9]);
         let after = strain(&before);
         // tensor components, without the free strain
-        let mechanical: [f64; SIX] = std::array::from_fn(|k| {
+        let mechanical: [f64; COMPONENTS] = std::array::from_fn(|k| {
             let change = after[k] - before[k];
             if k < 3 { change - step.free_strain } else { 0.5 * change }
         });
-        let mut branches = [[0.0; SIX]; 6];
+        let mut branches = [[0.0; COMPONENTS]; 6];
         let count = self.body.branches();
-        for (branch, kept) in branches.iter_mut().zip(state[9..].chunks_exact(SIX)) {
+        for (branch, kept) in branches.iter_mut().zip(state[9..].chunks_exact(COMPONENTS)) {
             branch.copy_from_slice(kept);
         }
         let nu = self.body.poisson;
         // Ĉ of modulus 1
         let (lame, shear) = (nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), 0.5 / (1.0 + nu));
-        let product = |a: &[f64; SIX], b: &[f64; SIX]| {
+        let product = |a: &[f64; COMPONENTS], b: &[f64; COMPONENTS]| {
             let sum = |range: std::ops::Range<usize>| range.map(|k| a[k] * b[k]).sum::<f64>();
             let traces = (a[0] + a[1] + a[2]) * (b[0] + b[1] + b[2]);
             lame * traces + 2.0 * shear * (sum(0..3) + 2.0 * sum(3..6))
@@ -118,10 +118,10 @@ impl Print {
         };
         step.advance(&mut branches[..count], &mechanical);
         let elastic = step.stress(&branches[..count]);
-        let sum: [f64; SIX] = std::array::from_fn(|k| elastic[k] + step.floor * mechanical[k]);
+        let sum: [f64; COMPONENTS] = std::array::from_fn(|k| elastic[k] + step.floor * mechanical[k]);
         new[..3].copy_from_slice(&[end.z, end.degree, end.temperature]);
         new[3..9].copy_from_slice(after.as_slice());
-        for (branch, kept) in branches.iter().zip(new[9..].chunks_exact_mut(SIX)) {
+        for (branch, kept) in branches.iter().zip(new[9..].chunks_exact_mut(COMPONENTS)) {
             kept.copy_from_slice(branch);
         }
         let volume = lame * (sum[0] + sum[1] + sum[2]);

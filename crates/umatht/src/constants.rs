@@ -24,7 +24,7 @@ pub const NAMES: [&str; 15] = [
     CONSTANT_NAMES[8],
 ];
 /// Number of constants before those of the user's own kinetics.
-pub const HEAD: usize = 6;
+pub const COMMON_COUNT: usize = 6;
 
 /// Invalid constant of the material.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -1,6 +1,6 @@
 //! Constants in a file, for hosts that do not pass all: CalculiX takes six of a thermal material.
 
-use crate::constants::{HEAD, NAMES};
+use crate::constants::{COMMON_COUNT, NAMES};
 use std::cell::RefCell;
 use std::path::Path;
 use std::rc::Rc;
@@ -39,8 +39,8 @@ pub fn complete(folder: &Path, name: &str, list: &[f64]) -> Result<Rc<[f64]>, St
         let text = std::fs::read_to_string(&path).map_err(|error| {
             format!("umatht: {}, asked for by constant `kinetics` 3: {error}", path.display())
         })?;
-        let mut whole = list[..list.len().min(HEAD)].to_vec();
-        whole.resize(HEAD, 0.0);
+        let mut whole = list[..list.len().min(COMMON_COUNT)].to_vec();
+        whole.resize(COMMON_COUNT, 0.0);
         whole[3] = 0.0;
         whole.extend(parse(&text).map_err(|error| format!("umatht: {}: {error}", path.display()))?);
         let whole = Rc::from(whole);
@@ -52,7 +52,7 @@ pub fn complete(folder: &Path, name: &str, list: &[f64]) -> Result<Rc<[f64]>, St
 /// Parses constants 7 to 15, in order.
 fn parse(text: &str) -> Result<Vec<f64>, String> {
     let table: toml::Table = text.parse().map_err(|error: toml::de::Error| error.to_string())?;
-    let names = &NAMES[HEAD..];
+    let names = &NAMES[COMMON_COUNT..];
     if let Some(other) = table.keys().find(|key| !names.contains(&key.as_str())) {
         return Err(format!("found `{other}`; allowed: {}", names.join(", ")));
     }

@@ -28,7 +28,7 @@ const LARGE: f64 = 0.2;
 
 /// Difference of forces that counts as agreement, in units of their root mean square: bonds are fitted to
 /// 1e-9 of their force (the solver's bound), and their sum is about ten times as large as the net force.
-const SAME: f64 = 1e-8;
+const SAME_FORCES: f64 = 1e-8;
 
 /// Returns rows, tables, and whether both programs solved the same problem.
 pub fn run(workspace: &Repository, folder: &Path) -> Result<(Vec<Row>, String, bool)> {
@@ -200,10 +200,10 @@ impl Peers {
         let Some(ForceDifference { largest, at, differing }) = compare(&state.forces, lammps) else {
             return Err(miette!("{what}: {} and {} forces, or all zero", state.forces.len(), lammps.len()));
         };
-        let same = largest <= SAME;
+        let same = largest <= SAME_FORCES;
         let why = match claim {
             Expectation::Same if same => "rounding and the fitted law".to_owned(),
-            Expectation::Same => format!("UNKNOWN: at most {SAME:e} was expected"),
+            Expectation::Same => format!("UNKNOWN: at most {SAME_FORCES:e} was expected"),
             Expectation::Differ(why) => why.to_owned(),
         };
         self.same &= same || matches!(claim, Expectation::Differ(_));

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::outcome::CaseOutcome;
 
 /// Relative changes below which a difference is rounding of another machine or instruction set.
-const STILL: f64 = 1e-6;
+const ROUNDING: f64 = 1e-6;
 
 /// Part of an earlier report.json that is compared.
 #[derive(Deserialize)]
@@ -95,7 +95,7 @@ impl EarlierReport {
                 compared += 1;
                 let Some(value) = before.value.as_ref().and_then(serde_json::Value::as_f64) else { continue };
                 let change = (now - value).abs() / value.abs().max(now.abs()).max(f64::MIN_POSITIVE);
-                if change > STILL || now.is_nan() || before.pass != judgement.pass {
+                if change > ROUNDING || now.is_nan() || before.pass != judgement.pass {
                     let tone = match (before.pass, judgement.pass) {
                         (true, false) => "bad",
                         (false, true) => "good",

@@ -2,7 +2,7 @@
 
 use super::{Description, ExportModel, Language, check_name, numbers, refuse_history};
 use crate::Error;
-use crate::surrogate::{Surrogate, UNSEEN};
+use crate::surrogate::{CONSTANT_TOLERANCE, Surrogate};
 use std::fmt::Write;
 
 /// Largest working memory of an exported law on the stack, bytes.
@@ -71,7 +71,7 @@ fn write_data(text: &mut String, law: &Description) {
     let limit = law.spread_limit.map_or("HUGE_VAL".to_owned(), |limit| format!("{limit:e}"));
     let _ = writeln!(
         text,
-        "#define SPREAD_LIMIT {limit}\n#define UNSEEN {UNSEEN:e}\n#define FARTHEST {:e}",
+        "#define SPREAD_LIMIT {limit}\n#define UNSEEN {CONSTANT_TOLERANCE:e}\n#define FARTHEST {:e}",
         law.farthest
     );
     for (name, values) in [("width", &law.widths), ("activation", &law.activations)] {

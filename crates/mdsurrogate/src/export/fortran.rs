@@ -3,7 +3,7 @@
 
 use super::{ExportModel, Language, check_name};
 use crate::Error;
-use crate::surrogate::{Surrogate, UNSEEN};
+use crate::surrogate::{CONSTANT_TOLERANCE, Surrogate};
 use std::fmt::Write;
 
 /// Numbers per line and lines per statement, below the limits of the standard (132 columns, 255
@@ -43,7 +43,7 @@ pub fn fortran_source(model: &Surrogate, name: &str) -> Result<String, Error> {
     }
     for (name, value) in [
         ("SPREAD_LIMIT", law.spread_limit.unwrap_or(f64::MAX)),
-        ("UNSEEN", UNSEEN),
+        ("UNSEEN", CONSTANT_TOLERANCE),
         ("FARTHEST", law.farthest),
         ("GREATEST_SEEN", softening.map_or(1.0, |softening| softening.greatest)),
     ] {

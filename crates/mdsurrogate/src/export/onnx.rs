@@ -6,7 +6,7 @@ use super::protobuf::{
 };
 use super::{ExportModel, refuse_history};
 use crate::Error;
-use crate::surrogate::{Kind, Surrogate, UNSEEN, derivative};
+use crate::surrogate::{CONSTANT_TOLERANCE, Kind, Surrogate, derivative};
 use prost::Message;
 
 /// Operator set, and the format version released with it.
@@ -407,7 +407,7 @@ impl ExportModel<'_> {
     }
 
     fn box_flags(&self, graph: &mut Builder) {
-        let slack = |[low, high]: &[f64; 2]| if low == high { UNSEEN } else { 0.0 };
+        let slack = |[low, high]: &[f64; 2]| if low == high { CONSTANT_TOLERANCE } else { 0.0 };
         let limits = &self.header.training_box;
         let low: Vec<f64> = limits.iter().map(|limit| limit[0] - slack(limit)).collect();
         let high: Vec<f64> = limits.iter().map(|limit| limit[1] + slack(limit)).collect();

@@ -315,7 +315,7 @@ fn remarks(all: &[Set]) -> String {
 }
 
 /// R² in the own and in other tables below which a law is unsafe there.
-const SAFE: f64 = 0.9;
+const SAFE_R2: f64 = 0.9;
 
 /// Lists R² of each law in its table and in the others, whether it is safe there, and where it is unstable.
 fn verdicts(set: &TableFits) -> String {
@@ -340,7 +340,7 @@ fn verdicts(set: &TableFits) -> String {
             let _ = write!(text, ", {other} {r2}");
         }
         let bad =
-            |found: &Option<Agreement>| !found.is_some_and(|found| found.r2.is_none_or(|r2| r2 >= SAFE));
+            |found: &Option<Agreement>| !found.is_some_and(|found| found.r2.is_none_or(|r2| r2 >= SAFE_R2));
         if !crossed.is_empty() {
             let unsafe_there = crossed.iter().any(|(_, _, found)| bad(found));
             let verdict = if unsafe_there { "unsafe outside" } else { "safe outside" };

@@ -56,7 +56,7 @@ pub use ogden::{Ogden, OgdenConvention};
 pub use polynomial::{MooneyRivlin, NeoHookean};
 pub use principal::PrincipalResponse;
 #[cfg(feature = "tables")]
-pub use table::{Meaning, Reading};
+pub use table::{ImportedTest, TestFormat};
 pub use yeoh::Yeoh;
 
 /// An isotropic hyperelastic law. Stresses and moduli in Pa, energies in J/m³.

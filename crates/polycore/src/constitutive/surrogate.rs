@@ -45,7 +45,7 @@ use nalgebra::SVector;
 use support::Nearest;
 
 /// Tolerance for components that never changed in the training data: ten times the rounding of f32.
-pub const UNSEEN: f64 = 1e-6;
+pub const CONSTANT_TOLERANCE: f64 = 1e-6;
 
 /// Law C → S in one of two precisions.
 #[derive(Debug, Clone)]
@@ -284,7 +284,7 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         for (a, [low, high]) in self.header.training_box.iter().enumerate() {
             let value = c[a].to_f64();
             // components that never changed may differ by rounding; NaN is outside
-            let slack = if low == high { UNSEEN } else { 0.0 };
+            let slack = if low == high { CONSTANT_TOLERANCE } else { 0.0 };
             flags.outside[a] = !(value >= low - slack && value <= high + slack);
             flags.unseen[a] = flags.outside[a] && low == high;
         }
@@ -373,7 +373,7 @@ fn product<T: Real>(row: &[T; 6], c: &[T; 6]) -> T {
 }
 
 /// Tᵀ g and Tᵀ H T: derivatives with respect to c from those with respect to T c.
-fn back<T: Real>(turn: &[[T; 6]; 6], g: &[T; 6], h: &[[T; 6]; 6]) -> ([T; 6], [[T; 6]; 6]) {
+fn to_data_axes<T: Real>(turn: &[[T; 6]; 6], g: &[T; 6], h: &[[T; 6]; 6]) -> ([T; 6], [[T; 6]; 6]) {
     let (mut first, mut half, mut second) = ([T::ZERO; 6], [[T::ZERO; 6]; 6], [[T::ZERO; 6]; 6]);
     for k in 0..6 {
         for a in 0..6 {

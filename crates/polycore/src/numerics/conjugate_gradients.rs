@@ -37,7 +37,7 @@ pub fn conjugate_gradients<const D: usize>(
     (solution, most)
 }
 
-fn each<T: Copy + Send + Sync>(out: &mut [T], of: &[T], value: impl Fn(&T, &T) -> T + Sync) {
+fn for_each_chunk<T: Copy + Send + Sync>(out: &mut [T], of: &[T], value: impl Fn(&T, &T) -> T + Sync) {
     out.par_chunks_mut(ITEM).zip(of.par_chunks(ITEM)).for_each(|(out, of)| {
         out.iter_mut().zip(of).for_each(|(out, of)| *out = value(out, of));
     });

@@ -12,9 +12,9 @@ use super::{Exponents, UnitError, table};
 /// Largest power of a unit; keeps exponents far from overflow.
 const LARGEST_POWER: i32 = 12;
 /// Deepest nesting of brackets.
-const DEEPEST: usize = 8;
+const DEEPEST_NESTING: usize = 8;
 /// Longest text of a unit, characters.
-const LONGEST: usize = 200;
+const LONGEST_UNIT: usize = 200;
 
 /// Splits `2e-3 N/mm^2` into the number and the trimmed rest.
 pub(super) fn split_number(text: &str) -> Result<(f64, &str), UnitError> {
@@ -64,7 +64,7 @@ pub(super) fn unit(unit: &str, whole: &str) -> Result<(f64, f64, Exponents), Uni
     if unit.is_empty() {
         return Ok((1.0, 1.0, [0; 8]));
     }
-    if unit.len() > LONGEST {
+    if unit.len() > LONGEST_UNIT {
         return Err(reader.problem("too long"));
     }
     let value = reader.expression()?;
@@ -123,7 +123,7 @@ impl UnitParser<'_> {
         let base = match self.peek() {
             Some('(') => {
                 self.depth += 1;
-                if self.depth > DEEPEST {
+                if self.depth > DEEPEST_NESTING {
                     return Err(self.problem("too many brackets"));
                 }
                 self.advance();

@@ -92,7 +92,7 @@ pub(super) fn affine(unit: &str) -> Option<(f64, f64)> {
 
 /// The nearest known symbol, for "did you mean".
 pub(super) fn nearest(text: &str) -> Option<String> {
-    const OFTEN: &str = "m mm cm km nm µm kg g mg t s ms min h d K degC N kN mN MN Pa kPa MPa GPa bar kbar \
+    const COMMON_UNITS: &str = "m mm cm km nm µm kg g mg t s ms min h d K degC N kN mN MN Pa kPa MPa GPa bar kbar \
                          atm J kJ mJ MJ W mW kW \
                          Hz kHz L mL rad deg % mol A cal eV";
     let names = [
@@ -146,7 +146,7 @@ pub(super) fn nearest(text: &str) -> Option<String> {
     if let Some((_, symbol)) = names.iter().find(|(name, _)| *name == lower || *name == singular) {
         return Some((*symbol).to_owned());
     }
-    let candidates = OFTEN.split_whitespace();
+    let candidates = COMMON_UNITS.split_whitespace();
     if let Some(same) = candidates.clone().find(|c| c.to_lowercase() == lower) {
         return Some(same.to_owned());
     }

@@ -26,11 +26,11 @@ pub fn compare(folder: &Path, python: &Path) -> Result<Vec<Comparison>, Error> {
     // the command runs in the folder, where a relative path would change its meaning
     let python = match python.components().count() {
         1 => find_program(python, std::env::var_os("VIRTUAL_ENV"), std::env::var_os("PATH")),
-        _ => std::path::absolute(python).map_err(Shared::io("find", python))?,
+        _ => std::path::absolute(python).map_err(Shared::from_io("find", python))?,
     };
     let python = &*python;
     let table = folder.join("check.csv");
-    let text = std::fs::read_to_string(&table).map_err(Shared::io("read", &table))?;
+    let text = std::fs::read_to_string(&table).map_err(Shared::from_io("read", &table))?;
     let own = forces(&table, text.lines().skip(1), ',', 4)?;
     let mut found = vec![run_check(folder, python, None, &own)?];
     if let Some(mpiexec) = mpiexec(python) {
@@ -60,7 +60,7 @@ fn run_check(
     let path = folder.join(&name);
     // a dump of an earlier run must not replace a missing one
     if path.exists() {
-        std::fs::remove_file(&path).map_err(Shared::io("remove", &path))?;
+        std::fs::remove_file(&path).map_err(Shared::from_io("remove", &path))?;
     }
     let mut command = match mpiexec {
         Some(mpiexec) => {
@@ -74,7 +74,7 @@ fn run_check(
         command.env("LD_LIBRARY_PATH", libraries);
     }
     let run = command.args(["drive.py", "--check", &name]).current_dir(folder).output();
-    let run = run.map_err(Shared::io("run", mpiexec.unwrap_or(python)))?;
+    let run = run.map_err(Shared::from_io("run", mpiexec.unwrap_or(python)))?;
     if !run.status.success() || !path.exists() {
         let message = String::from_utf8_lossy(&run.stderr);
         let last =
@@ -82,7 +82,7 @@ fn run_check(
         let reason = format!("{} with {} rank(s): {last}", run.status, ranks);
         return Err(Shared::Data { what: "LAMMPS".into(), reason }.into());
     }
-    let text = std::fs::read_to_string(&path).map_err(Shared::io("read", &path))?;
+    let text = std::fs::read_to_string(&path).map_err(Shared::from_io("read", &path))?;
     let theirs = forces(&path, text.lines().skip(9), ' ', 5)?;
     if theirs.len() != own.len() {
         let reason = format!("{} particles, the self-check state has {}", theirs.len(), own.len());

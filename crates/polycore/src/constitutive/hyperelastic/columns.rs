@@ -56,7 +56,7 @@ pub(super) enum ColumnKind {
 }
 
 /// Words that mark a quantity derived from a strain or stress.
-const OTHERS: [&str; 14] = [
+const DERIVED: [&str; 14] = [
     "rate",
     "modulus",
     "energy",
@@ -74,7 +74,7 @@ const OTHERS: [&str; 14] = [
 ];
 const STRETCHES: [&str; 7] = ["stretch", "lambda", "λ", "lambda1", "lambda2", "λ1", "λ2"];
 const STRAINS: [&str; 6] = ["strain", "dehnung", "ε", "eps", "epsilon", "stauchung"];
-const LENGTHENINGS: [&str; 5] = ["elongation", "extension", "displacement", "traverse", "verlängerung"];
+const ELONGATIONS: [&str; 5] = ["elongation", "extension", "displacement", "traverse", "verlängerung"];
 const STRESSES: [&str; 8] = ["stress", "nominal", "pk1", "p", "σ", "sigma", "spannung", "druckspannung"];
 const FORCES: [&str; 5] = ["force", "load", "kraft", "standardkraft", "prüfkraft"];
 const TRUE: [&str; 6] = ["true", "cauchy", "log", "logarithmic", "hencky", "wahre"];
@@ -107,8 +107,8 @@ impl Role {
         let ratio = unit
             .as_deref()
             .is_none_or(|unit| Unit::<RatioDimension>::parse(&crate::table::plain_unit(unit)).is_ok());
-        let lengthened = has(&LENGTHENINGS) && unit.is_some() && ratio;
-        let what = if has(&OTHERS) {
+        let lengthened = has(&ELONGATIONS) && unit.is_some() && ratio;
+        let what = if has(&DERIVED) {
             return None;
         } else if MODES.contains(&plain.as_str()) {
             ColumnKind::Mode
@@ -128,7 +128,7 @@ impl Role {
                 _ => None,
             };
             ColumnKind::Stress(measure)
-        } else if has(&FORCES) || has(&LENGTHENINGS) {
+        } else if has(&FORCES) || has(&ELONGATIONS) {
             ColumnKind::Raw
         } else {
             return None;

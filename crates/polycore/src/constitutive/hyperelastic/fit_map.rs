@@ -32,7 +32,7 @@ pub fn residuals<L: Hyperelastic + ?Sized>(law: &L, table: &TestData) -> Result<
 }
 
 /// Least effect on the stresses that counts: the differences carry 1e-10.
-const EFFECT: f64 = 1e-6;
+const LEAST_EFFECT: f64 = 1e-6;
 
 /// Uncertainty of the parameters at a minimum.
 pub(super) struct FitUncertainty {
@@ -64,7 +64,7 @@ pub(super) struct ParameterMap<'a> {
 }
 
 /// Bound of |q|, beyond which a parameter is practically at its limit or at infinity; e^±40 = 4e∓18.
-const FARTHEST: f64 = 40.0;
+const LARGEST_LOG: f64 = 40.0;
 
 impl<'a> ParameterMap<'a> {
     pub fn new(model: &'a ModelDescriptor, table: &TestData, modulus: f64) -> Result<Self, Error> {
@@ -95,7 +95,7 @@ impl<'a> ParameterMap<'a> {
 
     /// p and dp/dq.
     fn value(&self, i: usize, q: f64) -> (f64, f64) {
-        let exponential = q.clamp(-FARTHEST, FARTHEST).exp();
+        let exponential = q.clamp(-LARGEST_LOG, LARGEST_LOG).exp();
         match self.model.parameters[i].domain {
             Domain::Real => (q * self.scale(i), self.scale(i)),
             Domain::Positive => (exponential * self.scale(i), exponential * self.scale(i)),
@@ -179,16 +179,16 @@ impl<'a> ParameterMap<'a> {
             let modulus = matches!(parameter.domain, Domain::Positive) && parameter.unit == "Pa";
             let unlimited = matches!(parameter.domain, Domain::Above(_)) && q[i].exp() > 0.1 * UNLIMITED;
             found.identifiability[i] = match modulus {
-                true if *effect <= EFFECT => Identifiability::Absent,
+                true if *effect <= LEAST_EFFECT => Identifiability::Absent,
                 // the exponent of a term that is absent
                 false
-                    if *effect <= EFFECT
+                    if *effect <= LEAST_EFFECT
                         && i > 0
                         && found.identifiability[i - 1] == Identifiability::Absent =>
                 {
                     Identifiability::Absent
                 }
-                false if *effect <= EFFECT || unlimited => Identifiability::Undetermined,
+                false if *effect <= LEAST_EFFECT || unlimited => Identifiability::Undetermined,
                 _ => Identifiability::Determined,
             };
         }
@@ -213,7 +213,7 @@ impl<'a> ParameterMap<'a> {
     fn covariance(&self, q: &DVector<f64>, table: &TestData) -> Option<(Vec<usize>, DMatrix<f64>, usize)> {
         let (residuals, jacobian) = (self.residuals(q, table)?, self.jacobian(q, table)?);
         let norms: Vec<f64> = jacobian.column_iter().map(|column| column.norm()).collect();
-        let live: Vec<usize> = (0..q.len()).filter(|&i| norms[i] > EFFECT).collect();
+        let live: Vec<usize> = (0..q.len()).filter(|&i| norms[i] > LEAST_EFFECT).collect();
         let columns: Vec<_> = live.iter().map(|&i| jacobian.column(i) / norms[i]).collect();
         if columns.is_empty() || residuals.len() <= live.len() {
             return None;

@@ -130,12 +130,12 @@ fn condensed(
     stress: &voigt::Voigt,
     tangent: &voigt::Voigt6x6,
 ) -> PlaneStress {
-    const KEPT: [usize; 3] = [0, 1, 3];
+    const IN_PLANE: [usize; 3] = [0, 1, 3];
     PlaneStress {
         deformation,
-        stress: Vector3::from_fn(|i, _| stress[KEPT[i]]),
+        stress: Vector3::from_fn(|i, _| stress[IN_PLANE[i]]),
         tangent: Matrix3::from_fn(|i, j| {
-            let (a, b) = (KEPT[i], KEPT[j]);
+            let (a, b) = (IN_PLANE[i], IN_PLANE[j]);
             tangent[(a, b)] - tangent[(a, 2)] * tangent[(2, b)] / tangent[(2, 2)]
         }),
     }

@@ -10,10 +10,10 @@ use super::descriptor::{ABSENT, FitStart};
 const EXPONENTS: [f64; 14] = [0.3, 0.6, 1.0, 1.5, 2.0, 2.7, 3.6, 4.8, 6.5, 9.0, 12.0, 17.0, 24.0, 34.0];
 
 /// Number of starts handed to the optimiser.
-const KEPT: usize = 8;
+const SELECTED_STARTS: usize = 8;
 
 /// Number of starts from the optimum of the law with one term less.
-const GROWN: usize = 3;
+const EXTENDED_STARTS: usize = 3;
 
 /// Parameter sets [μ₁, α₁, …] in Abaqus' convention, best first, no two of them neighbours on the grid.
 pub(super) fn starts<const TERMS: usize>(start: &FitStart<'_>) -> Vec<Vec<f64>> {
@@ -49,7 +49,7 @@ pub(super) fn starts<const TERMS: usize>(start: &FitStart<'_>) -> Vec<Vec<f64>> 
         if !kept.iter().any(|(other, _)| near(other)) {
             kept.push((subset, moduli));
         }
-        if kept.len() == KEPT {
+        if kept.len() == SELECTED_STARTS {
             break;
         }
     }
@@ -93,7 +93,7 @@ pub(super) fn grown(smaller: &[f64], start: &FitStart<'_>) -> Vec<Vec<f64>> {
         found.push((-moduli.dot(&onto), parameters));
     }
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    all.extend(found.into_iter().take(GROWN).map(|(_, parameters)| parameters));
+    all.extend(found.into_iter().take(EXTENDED_STARTS).map(|(_, parameters)| parameters));
     all
 }
 

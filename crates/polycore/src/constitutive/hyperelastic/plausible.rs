@@ -17,13 +17,13 @@ pub(super) struct TestRow {
 }
 
 /// Share of the largest stress below which stresses are noise around zero.
-const NOISE: f64 = 0.02;
+const NOISE_LEVEL: f64 = 0.02;
 /// Strain without a unit beyond which it must be in per cent: rubbers break earlier.
 const LARGEST_STRAIN: f64 = 20.0;
 /// Share of the largest stress to which the stress of a torn specimen falls.
-const TORN: f64 = 0.7;
+const TORN_STRESS: f64 = 0.7;
 /// Share of the strain at the largest stress below which a specimen is unloaded, not torn.
-const HELD: f64 = 0.95;
+const UNLOADED_STRAIN: f64 = 0.95;
 
 /// Changes the sign of compressive stresses that are positive, and removes rows after the break of a
 /// specimen.
@@ -51,8 +51,9 @@ pub(super) fn plausible(
                        `strain = \"stretch\"`";
         return Err((rows[0].index, allowed.to_owned()));
     }
-    let counts =
-        |row: &&TestRow| row.nominal[0].abs() > NOISE * largest && (row.stretches[0] - 1.0).abs() > 1e-3;
+    let counts = |row: &&TestRow| {
+        row.nominal[0].abs() > NOISE_LEVEL * largest && (row.stretches[0] - 1.0).abs() > 1e-3
+    };
     let measured: Vec<TestRow> = rows.iter().filter(counts).copied().collect();
     let against: Vec<&TestRow> =
         measured.iter().filter(|row| (row.stretches[0] - 1.0) * row.nominal[0] < 0.0).collect();
@@ -89,7 +90,7 @@ pub(super) fn plausible(
 /// Returns true if the strains look like stretches: around 1 the stress is about 0, and none is near 0.
 fn called_strain(rows: &[TestRow], largest: f64) -> bool {
     let at_rest =
-        |row: &TestRow| (row.written[0] - 1.0).abs() < 0.02 && row.nominal[0].abs() <= NOISE * largest;
+        |row: &TestRow| (row.written[0] - 1.0).abs() < 0.02 && row.nominal[0].abs() <= NOISE_LEVEL * largest;
     rows.iter().any(at_rest)
         && rows.iter().all(|row| row.written[0] > 0.3)
         && rows.iter().any(|row| row.written[0] > 1.02 || row.written[0] < 0.98)
@@ -125,7 +126,9 @@ fn leave_out_tails(rows: &mut Vec<TestRow>, notes: &mut Vec<String>, mode: Mode)
             specimen.iter().copied().max_by(|&a, &b| rows[a].nominal[0].total_cmp(&rows[b].nominal[0]));
         if let Some(peak) = peak {
             let most = rows[peak].nominal[0];
-            let torn = |&i: &usize| rows[i].nominal[0] < TORN * most && strain(i) > HELD * strain(peak);
+            let torn = |&i: &usize| {
+                rows[i].nominal[0] < TORN_STRESS * most && strain(i) > UNLOADED_STRAIN * strain(peak)
+            };
             let tail: Vec<usize> = specimen.iter().copied().filter(|&i| i > peak).collect();
             if most > 0.0 && strain(peak) > 0.0 && tail.iter().any(torn) {
                 lost.extend(tail);

@@ -80,10 +80,10 @@ impl PrincipalResponse {
         }
         let shear = SHEAR.map(|(i, j)| {
             let (x, y) = (stretches[i], stretches[j]);
-            let slope = if (x - y).abs() > NEAR * room(x.max(y)) {
+            let slope = if (x - y).abs() > NEAR_EQUAL * room(x.max(y)) {
                 (stress[i] - stress[j]) / (x - y)
             } else {
-                // mean of dS/dλ over [y, x]; the error of the rule is (NEAR)⁶ relative, far below rounding
+                // mean of dS/dλ over [y, x]; the error of the rule is NEAR_EQUAL⁶ relative, far below rounding
                 GAUSS
                     .iter()
                     .map(|(at, weight)| {
@@ -133,7 +133,7 @@ impl PrincipalResponse {
 }
 
 /// Relative distance of stretches, on the scale on which w varies, below which the quadrature is used.
-const NEAR: f64 = 1e-3;
+const NEAR_EQUAL: f64 = 1e-3;
 
 /// Three-point Gauss–Legendre rule on [−1, 1], weights halved.
 const GAUSS: [(f64, f64); 3] =

@@ -6,7 +6,7 @@ use crate::tensor::Voigt;
 use serde::{Deserialize, Serialize};
 
 /// Bound of (m/m₀)^c.
-const BEYOND: f64 = 1e12;
+const LARGEST_GROWTH: f64 = 1e12;
 
 /// Pseudo-elasticity (Ogden and Roxburgh 1999, <https://doi.org/10.1098/rspa.1999.0431>) with a monotone
 /// network in place of their error function: S = (1 − d) 2 ∂W/∂C with
@@ -59,7 +59,7 @@ impl Softening {
         for [a, b, c] in &self.units {
             let fall = (b * (1.0 - energy / most)).tanh();
             // far beyond m₀ nothing is left, and no product is 0 · ∞
-            let reached = a * (most / self.greatest).powf(*c).min(BEYOND);
+            let reached = a * (most / self.greatest).powf(*c).min(LARGEST_GROWTH);
             sum += reached * fall;
             slope -= reached * (1.0 - fall * fall) * b / most;
         }

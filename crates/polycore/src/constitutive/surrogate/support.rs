@@ -53,7 +53,7 @@ impl Support {
         for (a, weight) in weights.iter_mut().enumerate() {
             let variance = rows.iter().map(|row| (row[a] - mean[a]).powi(2)).sum::<f64>() / count;
             // variance of a constant is rounding
-            if variance.sqrt() > super::UNSEEN {
+            if variance.sqrt() > super::CONSTANT_TOLERANCE {
                 *weight = 1.0 / variance.sqrt();
             }
         }

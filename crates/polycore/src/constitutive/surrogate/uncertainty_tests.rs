@@ -93,7 +93,8 @@ fn fitted(rows: &[Voigt]) -> Surrogate<f64> {
                 0.0 => 0.0,
                 deviation => (rows[row][a] - header.input_mean[a]) / deviation,
             };
-            Activation::Tanh.at(first.bias[k] + (0..6).map(|a| weights[a] * input(a)).sum::<f64>())[0]
+            Activation::Tanh.derivatives(first.bias[k] + (0..6).map(|a| weights[a] * input(a)).sum::<f64>())
+                [0]
         });
         let scaled = DMatrix::from_fn(rows.len(), 6, |row, a| match header.output_deviation[a] {
             0.0 => 0.0,
