@@ -3,7 +3,7 @@
 use super::PartScene;
 use super::fault::located;
 use crate::coupling::{STRAIN_STEP, StressSettings, loose_elements};
-use crate::mechanics::{SolidifyingMaxwell, is_known, key};
+use crate::mechanics::{SolidifyingMaxwell, is_supported, key};
 use crate::mesh::Mesh;
 use crate::mesh::path::ToolPath;
 use harness::scene::{SceneError, Source};
@@ -132,7 +132,7 @@ impl PartScene {
             material_of.iter().map(|&material| usize::from(material) == index).collect();
         absent.iter().for_each(|&element| bears[element as usize] = false);
         let all = || (0..mesh.element_count() as u32).map(|element| mesh.nodes(element));
-        let others = all().filter(|nodes| !is_known(nodes.len())).count();
+        let others = all().filter(|nodes| !is_supported(nodes.len())).count();
         if others > 0 {
             let found = format!("a mesh with {others} wedges, or hexahedra of second order");
             let allowed = "hexahedra of 8 nodes, tetrahedra of 4 or 10 (tetrahedra fill any shape: \

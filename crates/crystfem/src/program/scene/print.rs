@@ -60,12 +60,14 @@ impl PrintSpec {
     /// Elements at their times along a path.
     fn plan_along(&self, source: &Source, path: &ToolPath, times: &[f64]) -> Result<PrintPlan, SceneError> {
         let (window, schedule) = (self.window.map(|window| window.si()), self.schedule(source)?);
-        PrintPlan::along(path, times, self.start(), window, schedule.as_ref()).map_err(|error| match error {
-            Error::Parameter { name: NOZZLE, found: time, .. } => {
-                let found = format!("nothing, and no M104 or M109 in the file before {time} s");
-                source.error("print.temperature", found, "a temperature")
+        PrintPlan::along_path(path, times, self.start(), window, schedule.as_ref()).map_err(|error| {
+            match error {
+                Error::Parameter { name: NOZZLE, found: time, .. } => {
+                    let found = format!("nothing, and no M104 or M109 in the file before {time} s");
+                    source.error("print.temperature", found, "a temperature")
+                }
+                other => located(source, "print.window", &other),
             }
-            other => located(source, "print.window", &other),
         })
     }
 
