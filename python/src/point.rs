@@ -2,12 +2,12 @@
 
 use crate::error::fault;
 use crate::watch::left_alone;
-use crystfem::fit::{KineticFit, FixedConstants, Run, nakamura};
+use crystfem::fit::{FixedConstants, KineticFit, Run, nakamura};
 use crystfem::history::TemperatureHistory;
 use crystfem::kinetics::{KineticConstants, Kinetics};
-use crystfem::material::{Polymer, ThermalProperty, Semicrystalline, ThermalMaterial};
+use crystfem::material::{Polymer, Semicrystalline, ThermalMaterial, ThermalProperty};
 use crystfem::melting::Melting;
-use crystfem::point::{PointProcess, Drive, Stepping};
+use crystfem::point::{Drive, PointProcess, Stepping};
 use numpy::{IntoPyArray, PyArray2, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

@@ -148,7 +148,7 @@ fn check_tells_what_a_file_prints() {
     let bed = "{ file = \"part.gcode\", of = \"bed\" }";
     let told = check("leave_out = [\"skirt\", \"purge\", \"support\"]", bed).with_code(0);
     told.shows(
-        "the file prints 1 marked layer, middle lines from (0, -5, 0) mm to (10, 9, 0.2) mm, 3.100 \
+        "the file prints 1 marked layer, centrelines from (0, -5, 0) mm to (10, 9, 0.2) mm, 3.100 \
                 mm³ of 1.3 mm of filament",
     );
     told.shows("by feature: `Custom` 35.5 %, ");

@@ -22,7 +22,7 @@ pub fn printed(later: f64) -> Result<Simulation, crystfem::Error> {
     let path = parse(Path::new("block.gcode"), gcode().as_bytes())?;
     let end = path.duration();
     let cells = CellSettings::new([1e-3, 1e-3, 0.25e-3]);
-    let part = PrintedPart::along(path, &cells, Semicrystalline::pa12()?)?;
+    let part = PrintedPart::along_path(path, &cells, Semicrystalline::pa12()?)?;
     let mut simulation =
         part.hold("bottom", 373.15).convection(15.0, 353.15).simulate(Settings::adaptive(1e-3))?;
     simulation.run_until(end + later)?;

@@ -186,7 +186,7 @@ impl Simulation {
             let fixed = fixed.ok().map(|_| prescribed[k]);
             let capacity = before.unwrap_or(0.0);
             let mixture = Mixture { capacity, temperature: old, existed, sum };
-            let reached = mixture.settle(self, fixed, &mut list)?;
+            let reached = mixture.solve_temperature(self, fixed, &mut list)?;
             let old_heat = if existed { capacity * old } else { 0.0 };
             let mut change = (capacity + sum.capacity) * reached - old_heat;
             let mut new_heat = sum.heat;
@@ -265,7 +265,7 @@ struct Mixture<'a> {
 
 impl Mixture<'_> {
     /// Solves for the common temperature, and updates state and energy of `parts`.
-    fn settle(
+    fn solve_temperature(
         &self,
         simulation: &Simulation,
         fixed: Option<f64>,

@@ -193,7 +193,7 @@ impl Simulation {
     ///
     /// # Errors
     /// [`Error::NotFinite`] with the first that is not, its node and the time.
-    pub fn finite(&self) -> Result<(), Error> {
+    pub fn check_finite(&self) -> Result<(), Error> {
         let (problem, system, state) = (&self.problem, &self.system, &self.state);
         let fail = |quantity: &'static str, node: u32| {
             let [x, y, z] = problem.mesh.points[node as usize].map(|x| (1e9 * x).round() / 1e6);

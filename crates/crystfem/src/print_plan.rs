@@ -47,7 +47,7 @@ impl PrintPlan {
     ///
     /// # Errors
     /// Errors of [`groups`]; [`Error::Parameter`] named [`NOZZLE`].
-    pub fn along(
+    pub fn along_path(
         path: &ToolPath,
         times: &[f64],
         start: f64,

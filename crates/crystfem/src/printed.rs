@@ -44,7 +44,7 @@ impl PrintedPart {
     ///
     /// # Errors
     /// Errors of [`ToolPath::deposit`].
-    pub fn along(
+    pub fn along_path(
         path: ToolPath,
         cells: &CellSettings,
         material: impl ThermalMaterial + 'static,
@@ -141,7 +141,7 @@ impl PrintedPart {
             }
             Order::Path(path, times, fill) => {
                 let given = temperature.map(Schedule::constant);
-                (PrintPlan::along(&path, &times, 0.0, None, given.as_ref())?, Some(fill))
+                (PrintPlan::along_path(&path, &times, 0.0, None, given.as_ref())?, Some(fill))
             }
         };
         let births = plan.births;

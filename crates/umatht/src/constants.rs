@@ -1,7 +1,7 @@
 //! Constants of the material in the order of hosts.
 
 use crystfem::kinetics::{self, Kinetics};
-use crystfem::material::{CONSTANT_NAMES, Polymer, ThermalProperty, Semicrystalline};
+use crystfem::material::{CONSTANT_NAMES, Polymer, Semicrystalline, ThermalProperty};
 use crystfem::melting::Melting;
 use std::cell::RefCell;
 

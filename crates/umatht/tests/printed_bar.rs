@@ -1,7 +1,7 @@
 //! A bar printed layer by layer in CalculiX with the material of this crate, and in `crystfem`: node by node.
 
 use crystfem::kinetics::{KineticConstants, Kinetics};
-use crystfem::material::{Polymer, ThermalProperty, Semicrystalline};
+use crystfem::material::{Polymer, Semicrystalline, ThermalProperty};
 use crystfem::melting::Melting;
 use crystfem::mesh::{Bar, HEXAHEDRON_SIDES, Mesh};
 use crystfem::printed::PrintedPart;

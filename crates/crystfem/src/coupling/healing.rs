@@ -133,8 +133,8 @@ impl HealingCoupling {
         self.state.0.iter().map(|(integral, last)| last.map(|_| Healing::degree(*integral)))
     }
 
-    /// Least D_h of the interfaces of each element; 1 inside of a layer, NaN of elements that are not printed
-    /// or do not exist yet.
+    /// Smallest D_h of the interfaces of each element; 1 for interior elements, NaN for elements that are not
+    /// printed or do not exist yet.
     pub fn element_degrees(&self, simulation: &Simulation) -> Vec<f64> {
         let within = |(element, &printed): (u32, &bool)| {
             if printed && simulation.is_born(element) { 1.0 } else { f64::NAN }
@@ -150,7 +150,8 @@ impl HealingCoupling {
         least
     }
 
-    /// Least D_h and mean by area, times a scale: 1, or a strength; `None` before the first interface.
+    /// Smallest and area-weighted mean D_h, times a scale (1, or a strength); `None` before the first
+    /// interface.
     pub fn least_and_mean(&self, scale: f64) -> Option<[f64; 2]> {
         let (mut least, mut sum, mut area) = (f64::INFINITY, 0.0, 0.0);
         for (interface, degree) in self.settings.interfaces.iter().zip(self.degrees()) {
@@ -162,7 +163,7 @@ impl HealingCoupling {
         (area > 0.0).then(|| [scale * least, scale * sum / area])
     }
 
-    /// Returns the settings.
+    /// Settings.
     pub fn settings(&self) -> &HealingSettings {
         &self.settings
     }

@@ -186,7 +186,7 @@ impl<'a> StressCoupling<'a> {
                 change = pairs.map(|(from, to)| strain([from, to]).abs()).fold(change, f64::max);
             }
         }
-        self.body.born(born, law.branches());
+        self.body.activate(born, law.branches());
         // elements born now have no part in the past step
         let about = births.get(simulation.state().births).is_some_and(|birth| birth.time <= time);
         if must || about || change > self.settings.strain_step {

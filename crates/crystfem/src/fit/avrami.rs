@@ -41,7 +41,7 @@ pub fn avrami(times: &[f64], degrees: &[f64]) -> Result<KineticFit, Error> {
     };
     let starts: Vec<Vec<f64>> = [1.0, 2.5, 4.0].iter().map(|&n: &f64| vec![half(n), n.ln()]).collect();
     let minimum = minimize(what, &residuals, times.len(), &starts, STEP)?;
-    let [half, exponent] = [minimum.at[0], minimum.at[1]];
+    let [half, exponent] = [minimum.parameters[0], minimum.parameters[1]];
     let n = exponent.exp();
     // ln k = ln ln 2 − n ln t_½
     let estimate = |name, unit: &str, value: f64, gradient: [f64; 2]| {
@@ -60,6 +60,6 @@ pub fn avrami(times: &[f64], degrees: &[f64]) -> Result<KineticFit, Error> {
         rms: minimum.rms(),
         measurements: times.len(),
         evaluations: minimum.evaluations,
-        model: model(&minimum.at),
+        model: model(&minimum.parameters),
     })
 }

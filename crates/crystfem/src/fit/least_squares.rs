@@ -22,7 +22,7 @@ pub const STEP: f64 = 6e-6;
 /// A minimum of the sum of squares.
 pub struct Minimum {
     /// Parameters.
-    pub at: Vec<f64>,
+    pub parameters: Vec<f64>,
     /// Residuals at the minimum.
     pub residuals: Vec<f64>,
     /// Covariance of the parameters, s² (JᵀJ)⁻¹ with s² = Σr²/(m − k).
@@ -41,7 +41,7 @@ impl Minimum {
 
     /// Draws parameters from their posterior ([`polycore::posterior`]) and converts each draw to constants.
     pub fn draws(&self, constants: impl Fn(&[f64]) -> Vec<f64>) -> Vec<Vec<f64>> {
-        let drawn = posterior::draws(&self.at, &self.covariance, self.degrees, posterior::DRAWS, 0);
+        let drawn = posterior::draws(&self.parameters, &self.covariance, self.degrees, posterior::DRAWS, 0);
         drawn.unwrap_or_default().iter().map(|q| constants(q)).collect()
     }
 
@@ -100,8 +100,8 @@ pub fn minimize(
     let variance = found.iter().map(|r| r * r).sum::<f64>() / degrees as f64;
     let covariance =
         DMatrix::from_fn(at.len(), at.len(), |i, j| variance * inverse[(i, j)] / (norms[i] * norms[j]));
-    let at = at.as_slice().to_vec();
-    Ok(Minimum { at, residuals: found, covariance, degrees, evaluations: evaluations.get() })
+    let parameters = at.as_slice().to_vec();
+    Ok(Minimum { parameters, residuals: found, covariance, degrees, evaluations: evaluations.get() })
 }
 
 /// Computes the Jacobian by central differences.

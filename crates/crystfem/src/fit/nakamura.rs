@@ -172,7 +172,7 @@ pub fn nakamura(runs: &[Run], known: &FixedConstants) -> Result<KineticFit, Erro
         }
     }
     let minimum = minimize(what, &residuals, degrees.len(), &starts, STEP)?;
-    let q = &minimum.at;
+    let q = &minimum.parameters;
     let gradient = [1.0, q[1].exp() * barrier, LN_2.ln() / q[2].exp()];
     let estimate = |name, unit: &str, value: f64, gradient: [f64; 3]| {
         Estimate::of_logarithm(name, unit, value, minimum.error_of(&gradient), minimum.degrees)

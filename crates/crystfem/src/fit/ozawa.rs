@@ -85,7 +85,7 @@ pub fn ozawa(coolings: &[Cooling], temperature: f64) -> Result<KineticFit, Error
     let slope = points.iter().map(|p| p[0] * p[1]).sum::<f64>() / squares;
     let mean = points.iter().map(|p| p[1]).sum::<f64>() / points.len() as f64;
     let minimum = minimize(&what, &residuals, rates.len(), &[vec![-slope, mean]], STEP)?;
-    let [exponent, level] = [minimum.at[0], minimum.at[1]];
+    let [exponent, level] = [minimum.parameters[0], minimum.parameters[1]];
     let error = minimum.error_of(&[1.0, 0.0]);
     let reach = super::quantile(minimum.degrees) * error;
     let estimates = vec![
@@ -110,6 +110,6 @@ pub fn ozawa(coolings: &[Cooling], temperature: f64) -> Result<KineticFit, Error
         rms: minimum.rms(),
         measurements: rates.len(),
         evaluations: minimum.evaluations,
-        model: model(&minimum.at),
+        model: model(&minimum.parameters),
     })
 }

@@ -49,7 +49,7 @@ pub fn fit_in_part(model: &Model, degrees: &[f64], start: &KineticConstants) -> 
     };
     let begin = vec![start.growth_rate.ln() - jump - start.nucleation * barrier, start.nucleation.ln()];
     let minimum = minimize(what, &residuals, degrees.len(), &[begin], STEP)?;
-    let q = &minimum.at;
+    let q = &minimum.parameters;
     let estimate = |name, unit: &str, value: f64, gradient: [f64; 2]| {
         Estimate::of_logarithm(name, unit, value, minimum.error_of(&gradient), minimum.degrees)
     };

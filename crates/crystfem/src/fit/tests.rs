@@ -2,7 +2,7 @@ use super::*;
 use crate::kinetics::{KineticConstants, Kinetics, cooling_curve};
 use harness::case::Fault;
 
-/// Normal numbers (splitmix64 and Box–Muller).
+/// Normal random numbers (splitmix64 and Box–Muller).
 struct AlphaNoise(u64);
 
 impl AlphaNoise {
@@ -177,7 +177,7 @@ fn degenerate_data_have_named_errors() {
         assert_eq!(error.exit_code(), 2);
         assert!(error.to_string().contains(part), "{error}");
     }
-    // one isothermal run tells K and n, not K₀ and K_G
+    // one isothermal run determines K and n, not K₀ and K_G
     let hold = Run {
         times: (0..30).map(|k| 10.0 * f64::from(k)).collect(),
         temperatures: vec![430.0; 30],

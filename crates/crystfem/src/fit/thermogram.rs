@@ -27,7 +27,7 @@ pub struct MeasuredPeak {
 
 impl Thermogram {
     /// Returns the first time from `start` on, s, at which cooling passes a temperature, K.
-    pub fn passes(&self, temperature: f64, start: f64) -> Option<f64> {
+    pub fn first_crossing(&self, temperature: f64, start: f64) -> Option<f64> {
         (1..self.temperatures.len()).find_map(|row| {
             let [above, below] = [self.temperatures[row - 1], self.temperatures[row]];
             let share = (above - temperature) / (above - below);

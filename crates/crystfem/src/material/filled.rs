@@ -10,7 +10,7 @@ use std::sync::Arc;
 #[derive(Clone)]
 pub struct Filled {
     /// Filling material.
-    of: Arc<dyn ThermalMaterial>,
+    material: Arc<dyn ThermalMaterial>,
     /// Filled fraction; above 1 for overfilled elements.
     fill: f64,
 }
@@ -20,9 +20,9 @@ impl Filled {
     ///
     /// # Errors
     /// [`Error::Parameter`] for a fraction that is not above 0 and finite.
-    pub fn new(of: Arc<dyn ThermalMaterial>, fill: f64) -> Result<Self, Error> {
+    pub fn new(material: Arc<dyn ThermalMaterial>, fill: f64) -> Result<Self, Error> {
         if fill > 0.0 && fill.is_finite() {
-            return Ok(Self { of, fill });
+            return Ok(Self { material, fill });
         }
         Err(Error::Parameter { name: "filled part", found: fill, allowed: "above 0, finite".into() })
     }
@@ -63,55 +63,55 @@ pub fn fill_elements(
 
 impl ThermalMaterial for Filled {
     fn density(&self) -> f64 {
-        self.fill * self.of.density()
+        self.fill * self.material.density()
     }
 
     fn state_names(&self) -> &'static [&'static str] {
-        self.of.state_names()
+        self.material.state_names()
     }
 
     fn initial_state(&self, temperature: f64, state: &mut [f64]) {
-        self.of.initial_state(temperature, state);
+        self.material.initial_state(temperature, state);
     }
 
     fn field_names(&self) -> &'static [&'static str] {
-        self.of.field_names()
+        self.material.field_names()
     }
 
     fn fields(&self, state: &[f64], fields: &mut [f64]) {
-        self.of.fields(state, fields);
+        self.material.fields(state, fields);
     }
 
     fn crystallization_rate(&self, temperature: f64, state: &[f64]) -> f64 {
-        self.of.crystallization_rate(temperature, state)
+        self.material.crystallization_rate(temperature, state)
     }
 
     fn energy(&self, temperature: f64, state: &[f64]) -> f64 {
-        self.of.energy(temperature, state)
+        self.material.energy(temperature, state)
     }
 
     fn is_linear(&self) -> bool {
-        self.of.is_linear()
+        self.material.is_linear()
     }
 
     fn constant_conductivity(&self) -> bool {
-        self.of.constant_conductivity()
+        self.material.constant_conductivity()
     }
 
     fn potential(&self, temperature: f64) -> Option<[f64; 2]> {
-        self.of.potential(temperature).map(|pair| pair.map(|x| self.fill * x))
+        self.material.potential(temperature).map(|pair| pair.map(|x| self.fill * x))
     }
 
     fn crystals(&self) -> Option<&Crystallization> {
-        self.of.crystals()
+        self.material.crystals()
     }
 
     fn filling(&self) -> Option<&Arc<dyn ThermalMaterial>> {
-        Some(&self.of)
+        Some(&self.material)
     }
 
     fn respond(&self, at: &PointInput, old: &[f64], new: &mut [f64]) -> Result<ThermalResponse, Error> {
-        let own = self.of.respond(at, old, new)?;
+        let own = self.material.respond(at, old, new)?;
         Ok(ThermalResponse {
             flux: self.fill * own.flux,
             d_flux_d_temperature: self.fill * own.d_flux_d_temperature,

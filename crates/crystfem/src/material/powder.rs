@@ -13,7 +13,7 @@ const FIELDS: &[&str] = &["alpha", "crystallinity", "consolidated"];
 /// Density and specific heat are those of the solid: settling of the bed is not modelled.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Powder<M> {
-    of: M,
+    solid: M,
     /// φ, conductivity of powder over that of the solid.
     share: f64,
     /// Temperatures at which consolidation begins and ends, K.
@@ -27,7 +27,7 @@ impl<M: ThermalMaterial> Powder<M> {
     /// # Errors
     /// [`Error::Parameter`] for φ outside (0, 1], and temperatures that are not above 0, increasing and
     /// finite.
-    pub fn new(of: M, share: f64, window: [f64; 2]) -> Result<Self, Error> {
+    pub fn new(solid: M, share: f64, window: [f64; 2]) -> Result<Self, Error> {
         let refuse =
             |name, found, allowed: &str| Err(Error::Parameter { name, found, allowed: allowed.to_owned() });
         if !(share > 0.0 && share <= 1.0) {
@@ -47,7 +47,7 @@ impl<M: ThermalMaterial> Powder<M> {
                 "above that at which it begins",
             );
         }
-        Ok(Self { of, share, window })
+        Ok(Self { solid, share, window })
     }
 
     /// Returns p and its slope over T, starting from `before`.
@@ -59,13 +59,13 @@ impl<M: ThermalMaterial> Powder<M> {
 
     /// Number of states of the solid.
     fn solid_states(&self) -> usize {
-        self.of.state_names().len()
+        self.solid.state_names().len()
     }
 }
 
 impl<M: ThermalMaterial> ThermalMaterial for Powder<M> {
     fn density(&self) -> f64 {
-        self.of.density()
+        self.solid.density()
     }
 
     fn state_names(&self) -> &'static [&'static str] {
@@ -74,7 +74,7 @@ impl<M: ThermalMaterial> ThermalMaterial for Powder<M> {
 
     fn initial_state(&self, temperature: f64, state: &mut [f64]) {
         let (own, last) = state.split_at_mut(self.solid_states());
-        self.of.initial_state(temperature, own);
+        self.solid.initial_state(temperature, own);
         last[0] = self.consolidated(temperature, 0.0)[0];
     }
 
@@ -85,16 +85,16 @@ impl<M: ThermalMaterial> ThermalMaterial for Powder<M> {
     fn fields(&self, state: &[f64], fields: &mut [f64]) {
         let (own, last) = state.split_at(self.solid_states());
         let count = fields.len() - 1;
-        self.of.fields(own, &mut fields[..count]);
+        self.solid.fields(own, &mut fields[..count]);
         fields[count] = last[0];
     }
 
     fn crystallization_rate(&self, temperature: f64, state: &[f64]) -> f64 {
-        self.of.crystallization_rate(temperature, &state[..self.solid_states()])
+        self.solid.crystallization_rate(temperature, &state[..self.solid_states()])
     }
 
     fn energy(&self, temperature: f64, state: &[f64]) -> f64 {
-        self.of.energy(temperature, &state[..self.solid_states()])
+        self.solid.energy(temperature, &state[..self.solid_states()])
     }
 
     fn is_linear(&self) -> bool {
@@ -107,7 +107,7 @@ impl<M: ThermalMaterial> ThermalMaterial for Powder<M> {
 
     fn respond(&self, at: &PointInput, old: &[f64], new: &mut [f64]) -> Result<ThermalResponse, Error> {
         let own = self.solid_states();
-        let response = self.of.respond(at, &old[..own], &mut new[..own])?;
+        let response = self.solid.respond(at, &old[..own], &mut new[..own])?;
         let [part, slope] = self.consolidated(at.temperature + at.increment, old[own]);
         new[own] = part;
         let factor = self.share + (1.0 - self.share) * part;

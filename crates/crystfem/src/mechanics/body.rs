@@ -72,8 +72,9 @@ impl<'a> Body<'a> {
             return Err(fault("poisson", poisson, "above -1 and below 0.5"));
         }
         let count = mesh.element_count();
-        let others =
-            (0..count as u32).filter(|&element| !element_kind::is_known(mesh.nodes(element).len())).count();
+        let others = (0..count as u32)
+            .filter(|&element| !element_kind::is_supported(mesh.nodes(element).len()))
+            .count();
         if others > 0 {
             return Err(fault("elements other than 8-node hexahedra and tetrahedra", others as f64, "none"));
         }
@@ -109,7 +110,7 @@ impl<'a> Body<'a> {
     }
 
     /// Activates elements, free of stress and strain.
-    pub fn born(&mut self, elements: impl IntoIterator<Item = usize>, branches: usize) {
+    pub fn activate(&mut self, elements: impl IntoIterator<Item = usize>, branches: usize) {
         for element in elements {
             self.state.strains[element] = vec![[[0.0; 6]; GAUSS_POINTS]; branches];
             self.state.stresses[element] = [[0.0; 6]; GAUSS_POINTS];

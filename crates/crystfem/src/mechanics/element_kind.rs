@@ -15,7 +15,7 @@ pub enum MechanicalElement {
 }
 
 /// Returns true if stress can be computed in elements with this number of nodes.
-pub fn is_known(nodes: usize) -> bool {
+pub fn is_supported(nodes: usize) -> bool {
     matches!(nodes, 4 | 8 | 10)
 }
 

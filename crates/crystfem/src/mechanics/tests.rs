@@ -92,7 +92,7 @@ fn the_patch_test_holds() {
 fn a_free_cube_has_no_stress() {
     let mesh = block([3, 3, 3], [3e-3; 3]);
     let mut body = Body::new(&mesh, 0.4).unwrap();
-    body.born(0..27, 1);
+    body.activate(0..27, 1);
     body.step(|_| hold(1e9), |_, _, place| 1e-2 * place[2] / 3e-3, &resting(&mesh)).unwrap();
     let most = (0..27).flat_map(|e| (0..GAUSS_POINTS).map(move |p| (e, p)));
     let most = most.flat_map(|(e, p)| body.stress(e, p)).fold(0.0_f64, |most, s| most.max(s.abs()));
@@ -105,7 +105,7 @@ fn a_free_cube_has_no_stress() {
 fn a_bimetal_bends() {
     let mesh = block([16, 1, 3], [0.04, 2e-3, 3e-3]);
     let mut body = Body::new(&mesh, 0.0).unwrap();
-    body.born(0..48, 1);
+    body.activate(0..48, 1);
     let low = |element: usize| element < 16;
     body.step(
         |e| hold(if low(e) { 3e9 } else { 1.5e9 }),
@@ -125,7 +125,7 @@ fn layers_in_sequence_bend() {
         let mesh = block([along, 1, layers], [length, 2e-3, 1e-3 * layers as f64]);
         let mut body = Body::new(&mesh, 0.0).unwrap();
         for layer in 0..layers {
-            body.born(layer * along..(layer + 1) * along, 1);
+            body.activate(layer * along..(layer + 1) * along, 1);
             let shrinks = |e: usize| if e / along == layer { -0.01 } else { 0.0 };
             body.step(|_| hold(1e9), |e, _, _| shrinks(e), &resting(&mesh)).unwrap();
         }
@@ -141,9 +141,9 @@ fn layers_bend_their_substrate() {
         let height = 2e-3 / layers as f64;
         let mesh = block([32, 1, 2 * layers], [0.064, 2e-3, 4e-3]);
         let mut body = Body::new(&mesh, 0.0).unwrap();
-        body.born(0..32 * layers, 1);
+        body.activate(0..32 * layers, 1);
         for layer in layers..2 * layers {
-            body.born(32 * layer..32 * (layer + 1), 1);
+            body.activate(32 * layer..32 * (layer + 1), 1);
             let shrinks = |e: usize| if e / 32 == layer { -0.01 } else { 0.0 };
             body.step(|_| hold(1e9), |e, _, _| shrinks(e), &resting(&mesh)).unwrap();
         }
@@ -170,7 +170,7 @@ fn a_part_is_released_from_its_bed() {
         .flat_map(|n| (0..3).map(move |d| (n, d)))
         .collect();
     for layer in 0..8 {
-        body.born(32 * layer..32 * (layer + 1), 1);
+        body.activate(32 * layer..32 * (layer + 1), 1);
         let strain = -(0.010 + 0.004 * (layer as f64 + 0.5) / 8.0);
         body.step(|_| hold(1e9), |e, _, _| if e / 32 == layer { strain } else { 0.0 }, &bed).unwrap();
     }
@@ -190,7 +190,7 @@ fn a_release_does_the_work_of_its_reactions() {
         .filter(|&n| mesh.points[n as usize][2] == 0.0)
         .flat_map(|n| (0..3).map(move |d| (n, d)))
         .collect();
-    body.born(0..128, 1);
+    body.activate(0..128, 1);
     body.step(|_| hold(1e9), |e, _, _| -1e-3 * (e / 32) as f64, &bed).unwrap();
     let before = body.state.clone();
     let mut reaction = vec![Vector3::<f64>::zeros(); mesh.points.len()];
@@ -234,7 +234,7 @@ fn iterations_do_not_follow_the_shape() {
         let mesh = block(count, count.map(|n| n as f64));
         let mut body = Body::new(&mesh, 0.4).unwrap();
         body.tolerance = 1e-6;
-        body.born(0..mesh.hexahedra.len(), 1);
+        body.activate(0..mesh.hexahedra.len(), 1);
         let bed: Vec<FixedComponent> = (0..mesh.points.len() as u32)
             .filter(|&n| mesh.points[n as usize][2] == 0.0)
             .flat_map(|n| (0..3).map(move |d| (n, d)))

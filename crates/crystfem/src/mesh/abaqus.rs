@@ -164,7 +164,7 @@ impl InputReader<'_> {
         if let Some(name) = card.parameter("NSET") {
             let labels = self.content.nodes[first..].iter();
             let entries = labels.map(|node| (node.line as usize, SetEntry::Label(node.label))).collect();
-            self.sets.push(FileSet { name: name.to_owned(), of: SetKind::Nodes, entries });
+            self.sets.push(FileSet { name: name.to_owned(), kind: SetKind::Nodes, entries });
         }
         Ok(())
     }
@@ -213,20 +213,20 @@ impl InputReader<'_> {
             let labels = self.content.elements[first..].iter();
             let entries =
                 labels.map(|element| (element.line as usize, SetEntry::Label(element.label))).collect();
-            self.sets.push(FileSet { name: name.to_owned(), of: SetKind::Elements, entries });
+            self.sets.push(FileSet { name: name.to_owned(), kind: SetKind::Elements, entries });
         }
         Ok(())
     }
 
-    fn set(&mut self, card: Card, of: SetKind, key: &'static str, cards: &mut Cards) -> Result<(), Error> {
+    fn set(&mut self, card: Card, kind: SetKind, key: &'static str, cards: &mut Cards) -> Result<(), Error> {
         let Some(name) = card.parameter(key) else {
             let allowed = format!("*{key}, {key}=NAME");
             return Err(line_error(self.path, card.line, "name of a set", "", allowed));
         };
         let mut entries = Vec::new();
-        let mut of = of;
-        if let (SetKind::Nodes, Some(elements)) = (of, card.parameter("ELSET")) {
-            of = SetKind::NodesOfElements;
+        let mut kind = kind;
+        if let (SetKind::Nodes, Some(elements)) = (kind, card.parameter("ELSET")) {
+            kind = SetKind::NodesOfElements;
             entries.push((card.line, SetEntry::Set(elements.to_owned())));
         }
         let generate = card.parameter("GENERATE").is_some();
@@ -248,7 +248,7 @@ impl InputReader<'_> {
                 entries.extend(words.iter().map(|word| (row.line, SetEntry::parse(word))));
             }
         }
-        self.sets.push(FileSet { name: name.to_owned(), of, entries });
+        self.sets.push(FileSet { name: name.to_owned(), kind, entries });
         Ok(())
     }
 
@@ -285,8 +285,8 @@ impl InputReader<'_> {
             };
             entries.push((row.line, SetEntry::Side(Box::new(SetEntry::parse(first)), side)));
         }
-        let of = if nodes { SetKind::Nodes } else { SetKind::Faces };
-        self.sets.push(FileSet { name: name.to_owned(), of, entries });
+        let kind = if nodes { SetKind::Nodes } else { SetKind::Faces };
+        self.sets.push(FileSet { name: name.to_owned(), kind, entries });
         Ok(())
     }
 

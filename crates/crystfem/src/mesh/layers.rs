@@ -119,7 +119,7 @@ impl Layers {
         let mut notes = Vec::new();
         if across > 0 {
             notes.push(format!(
-                "{across} elements reach into a second layer: they belong to that of their centre"
+                "{across} elements reach into a second layer: each belongs to the layer of its centre"
             ));
         }
         Ok(Self { elements: layers, notes })

@@ -74,7 +74,7 @@ pub fn check(mesh: &Mesh, labels: Option<&[u64]>) -> Result<Quality, Error> {
     if worst.aspect.0.is_nan() || worst.aspect.0 > MAX_ASPECT {
         return refuse(worst.aspect, "longest over shortest edge", format!("at most {GREATEST_ASPECT:e}"));
     }
-    check_twice(mesh, labels)?;
+    check_duplicates(mesh, labels)?;
     check_sets(mesh)?;
     let surface = OuterSurface::of_all(mesh)?;
     let mut notes = Vec::new();
@@ -93,7 +93,7 @@ pub fn check(mesh: &Mesh, labels: Option<&[u64]>) -> Result<Quality, Error> {
     if unused > 0 {
         notes.push(format!("{unused} nodes belong to no element, node {first} first"));
     }
-    if let Some((count, [a, b])) = doubles(mesh, &surface) {
+    if let Some((count, [a, b])) = coincident_nodes(mesh, &surface) {
         let [x, y, z] = mesh.points[a as usize];
         notes.push(format!(
             "{count} nodes lie on others, nodes {a} and {b} at ({x:.6e}, {y:.6e}, {z:.6e}) m first: not \
@@ -304,7 +304,7 @@ fn check_numbers(mesh: &Mesh, labels: Option<&[u64]>) -> Result<(), Error> {
 }
 
 /// Checks for duplicate elements.
-fn check_twice(mesh: &Mesh, labels: Option<&[u64]>) -> Result<(), Error> {
+fn check_duplicates(mesh: &Mesh, labels: Option<&[u64]>) -> Result<(), Error> {
     let mut keys: Vec<([u32; 8], u32)> = (0..mesh.element_count() as u32)
         .map(|element| {
             // corners distinguish elements
@@ -377,7 +377,7 @@ fn parts(mesh: &Mesh) -> (usize, usize, usize) {
 
 /// Counts coincident nodes, within 1e-9 of the box's diagonal; returns also the first pair. Only nodes of the
 /// outer surface are compared: faces between duplicate nodes are outer faces.
-fn doubles(mesh: &Mesh, surface: &OuterSurface) -> Option<(usize, [u32; 2])> {
+fn coincident_nodes(mesh: &Mesh, surface: &OuterSurface) -> Option<(usize, [u32; 2])> {
     let [lower, upper] = mesh.bounds()?;
     let near = 1e-9 * (Vector3::from(upper) - Vector3::from(lower)).norm();
     let faces: Vec<Face> = surface.faces().collect();

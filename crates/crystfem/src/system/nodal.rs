@@ -1,8 +1,7 @@
 //! Material points at nodes, for materials with constant conductivity: one for each node, material and birth.
 //!
-//! At a node all elements of one material and birth share one temperature history, hence one state, whatever
-//! fraction of them the material fills; a mesh of hexahedra needs an eighth of the calls that Gauss points
-//! would need.
+//! At a node all elements of one material and birth share one temperature history, hence one state, for any
+//! fill fraction; a mesh of hexahedra needs an eighth of the calls that Gauss points would need.
 
 use super::vector::{CHUNK, items};
 use super::{Evaluation, MaterialBehaviour, NONE, PointMoves, PointStates, StepInput};
@@ -40,8 +39,8 @@ pub struct NodalPoints {
     pub laws: Vec<Crystallization>,
     /// Index in `laws` of each material.
     pub law_of: Vec<Option<u16>>,
-    /// First material with the same states, for each material, whatever fraction of the elements it fills:
-    /// they share points.
+    /// First material with the same states, for each material: materials that differ only in the fraction of
+    /// the elements they fill share points.
     pub like: Vec<u16>,
 }
 

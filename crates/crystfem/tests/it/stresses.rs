@@ -50,7 +50,7 @@ fn rounded<const N: usize>(place: [f64; N], share: f64) -> [f64; N] {
 pub(crate) fn heated(mesh: &Mesh, poisson: f64, strain: impl Fn([f64; 3]) -> f64) -> Body<'_> {
     let mut body = Body::new(mesh, poisson).unwrap();
     body.tolerance = 1e-10;
-    body.born(0..mesh.element_count(), 1);
+    body.activate(0..mesh.element_count(), 1);
     let law = SolidifyingMaxwell::elastic(1.0, poisson, 0.0, f64::INFINITY);
     let supports: Vec<FixedComponent> = (0..mesh.points.len() as u32)
         .flat_map(|node| (0..3).map(move |d| (node, d)))

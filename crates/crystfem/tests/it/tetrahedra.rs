@@ -32,7 +32,7 @@ fn step<'a>(
     strain: impl Fn(usize, [f64; 3]) -> f64,
 ) -> Body<'a> {
     let mut body = Body::new(mesh, poisson).unwrap();
-    body.born(0..mesh.element_count(), 1);
+    body.activate(0..mesh.element_count(), 1);
     let law = |e| SolidifyingMaxwell::elastic(modulus(e), poisson, 0.0, f64::INFINITY);
     let hold = |e| law(e).increment([300.0, 0.0], [300.0, 0.0], 0.0);
     body.step(hold, |e, _, place| strain(e, place), &three_two_one_supports(mesh)).unwrap();

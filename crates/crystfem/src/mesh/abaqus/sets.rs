@@ -34,7 +34,7 @@ pub(super) enum SetEntry {
 #[derive(Debug)]
 pub(super) struct FileSet {
     pub name: String,
-    pub of: SetKind,
+    pub kind: SetKind,
     pub entries: Vec<(usize, SetEntry)>,
 }
 
@@ -69,7 +69,7 @@ impl Resolver<'_> {
         let mut outer = None;
         for set in sets {
             let key = set.name.to_uppercase();
-            match set.of {
+            match set.kind {
                 SetKind::Nodes => {
                     let mut members = Vec::new();
                     for (line, entry) in &set.entries {
@@ -90,8 +90,8 @@ impl Resolver<'_> {
                         self.members(*line, entry, self.elements, &element_sets, "element", &mut members)?;
                     }
                     self.count_work(set.entries.first().map_or(0, |entry| entry.0), 8 * members.len())?;
-                    let of = members.iter().map(|place| &content.elements[*place as usize]);
-                    let nodes = of
+                    let elements = members.iter().map(|place| &content.elements[*place as usize]);
+                    let nodes = elements
                         .flat_map(|element| content.nodes_of(element))
                         .filter_map(|label| self.nodes.get(*label))
                         .collect();
@@ -100,9 +100,9 @@ impl Resolver<'_> {
                 SetKind::Faces => {
                     let mut found = Vec::new();
                     for (line, entry) in &set.entries {
-                        let SetEntry::Side(of, side) = entry else { continue };
+                        let SetEntry::Side(entry, side) = entry else { continue };
                         let mut members = Vec::new();
-                        self.members(*line, of, self.elements, &element_sets, "element", &mut members)?;
+                        self.members(*line, entry, self.elements, &element_sets, "element", &mut members)?;
                         self.sides(*line, &members, *side, content, &mut outer, &mut found)?;
                     }
                     faces.entry(key).or_insert((set.name, Vec::new())).1.append(&mut found);
@@ -163,7 +163,7 @@ impl Resolver<'_> {
                 self.count_work(line, set.len().saturating_add(1))?;
                 members.extend_from_slice(set);
             }
-            SetEntry::Side(of, _) => self.members(line, of, labels, sets, kind, members)?,
+            SetEntry::Side(entry, _) => self.members(line, entry, labels, sets, kind, members)?,
         }
         Ok(())
     }

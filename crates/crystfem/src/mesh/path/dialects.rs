@@ -408,7 +408,7 @@ fn estimates_are_compared() {
     .summary(1.75e-3);
     assert!(
         lines[0].starts_with(
-            "the file prints 1 marked layer, middle lines from (0, 0, 0) mm to (100, \
+            "the file prints 1 marked layer, centrelines from (0, 0, 0) mm to (100, \
         0, 0) mm, 9.621 mm³ of 4.0 mm"
         ),
         "{lines:?}"

@@ -45,12 +45,12 @@ impl ToolPath {
 
     /// A setting over time: pairs of start time, s, and value. The last of simultaneous commands wins. For
     /// the bed NaN means off.
-    pub fn setting(&self, of: Setting) -> Vec<(f64, f64)> {
+    pub fn setting(&self, setting: Setting) -> Vec<(f64, f64)> {
         let mut pairs: Vec<(f64, f64)> = Vec::new();
         for command in &self.commands {
             let value = match command.setting {
-                Setting::BedOff if of == Setting::Bed => f64::NAN,
-                own if own == of => command.value,
+                Setting::BedOff if setting == Setting::Bed => f64::NAN,
+                own if own == setting => command.value,
                 _ => continue,
             };
             while pairs.last().is_some_and(|pair| pair.0 >= command.time) {

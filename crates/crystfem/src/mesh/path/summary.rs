@@ -50,7 +50,7 @@ impl ToolPath {
         let layers = if self.layers > 0 { self.layers } else { self.levels().len() };
         let volume: f64 = self.printing_moves().map(|one| one.volume(filament)).sum();
         let mut lines = vec![format!(
-            "the file prints {layers} {}, middle lines from {} to {}, {:.3} mm³ of {:.1} mm of filament, in \
+            "the file prints {layers} {}, centrelines from {} to {}, {:.3} mm³ of {:.1} mm of filament, in \
              {}",
             match (self.layers > 0, layers) {
                 (true, 1) => "marked layer",

@@ -9,7 +9,7 @@ use crate::file::line_error;
 pub(super) type Corners = (Vec<[f32; 3]>, Option<String>);
 
 /// Reads either encoding: binary if the number of triangles in bytes 81 to 84 fits the file (as text these
-/// four exceed 5e8), whatever the header says.
+/// four exceed 5e8), with any header.
 ///
 /// # Errors
 /// [`Error::File`] with the line of text, or the sizes in bytes.

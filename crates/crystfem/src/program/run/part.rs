@@ -150,7 +150,7 @@ fn solve(
         (true, frames) => Some(MeshSeries::resume(path, mesh.points.clone(), cells(mesh), frames)?),
     };
     if *frames == 0 {
-        simulation.finite()?;
+        simulation.check_finite()?;
         observers.see(simulation)?;
     }
     let (interrupted, names) = (run.options.interrupted, simulation.field_names());
@@ -158,7 +158,7 @@ fn solve(
         let until = (*frames as f64 * every).min(end);
         let mut result = Ok(());
         let mut observe = |simulation: &Simulation, step: &StepBalance| -> ControlFlow<()> {
-            result = simulation.finite().and_then(|()| observers.see(simulation));
+            result = simulation.check_finite().and_then(|()| observers.see(simulation));
             let state = simulation.state();
             run.show(state.time / end, &|| {
                 let (time, dt, equations) = (state.time, step.dt, state.temperature.len());

@@ -171,7 +171,7 @@ impl FlowTable {
             }
             Some(Limit::Temperature(wanted)) => {
                 let wanted = wanted.si();
-                self.measured.passes(wanted, start).ok_or_else(|| {
+                self.measured.first_crossing(wanted, start).ok_or_else(|| {
                     let celsius = |kelvin: f64| kelvin - 273.15;
                     let low = temperatures.iter().fold(f64::INFINITY, |low, &t| low.min(t));
                     let high = temperatures.iter().fold(0.0, |high: f64, &t| high.max(t));

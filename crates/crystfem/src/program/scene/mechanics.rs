@@ -3,7 +3,7 @@
 use super::PartScene;
 use super::locate_error::located;
 use crate::coupling::{STRAIN_STEP, StressSettings, loose_elements};
-use crate::mechanics::{SolidifyingMaxwell, is_known, key};
+use crate::mechanics::{SolidifyingMaxwell, is_supported, key};
 use crate::mesh::Mesh;
 use crate::mesh::path::ToolPath;
 use harness::scene::{SceneError, Source};
@@ -128,7 +128,7 @@ impl PartScene {
             material_of.iter().map(|&material| usize::from(material) == index).collect();
         absent.iter().for_each(|&element| bears[element as usize] = false);
         let all = || (0..mesh.element_count() as u32).map(|element| mesh.nodes(element));
-        let others = all().filter(|nodes| !is_known(nodes.len())).count();
+        let others = all().filter(|nodes| !is_supported(nodes.len())).count();
         if others > 0 {
             let found = format!("a mesh with {others} wedges or second-order hexahedra");
             let allowed = "8-node hexahedra, 4- or 10-node tetrahedra (meshers produce tetrahedra for any shape; \

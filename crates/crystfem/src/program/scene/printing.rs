@@ -60,13 +60,15 @@ impl PrintSpec {
     /// Plans elements with given times along a path.
     fn plan_along(&self, source: &Source, path: &ToolPath, times: &[f64]) -> Result<PrintPlan, SceneError> {
         let (window, schedule) = (self.window.map(|window| window.si()), self.schedule(source)?);
-        PrintPlan::along(path, times, self.start(), window, schedule.as_ref()).map_err(|error| match error {
-            Error::Parameter { name: NOZZLE, found: time, .. } => {
-                let why =
+        PrintPlan::along_path(path, times, self.start(), window, schedule.as_ref()).map_err(|error| {
+            match error {
+                Error::Parameter { name: NOZZLE, found: time, .. } => {
+                    let why =
                     format!("the file sets no nozzle temperature (M104, M109) before {time} s; write it");
-                source.missing("print.temperature", why)
+                    source.missing("print.temperature", why)
+                }
+                other => located(source, "print.window", &other),
             }
-            other => located(source, "print.window", &other),
         })
     }
 

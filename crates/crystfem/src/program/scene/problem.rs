@@ -6,7 +6,7 @@ use super::memory;
 use super::part::{BoundarySpec, PartScene};
 use super::selection::{elements, millimetres};
 use super::voxels::{BuiltMesh, Filling};
-use crate::boundary::{Condition, FaceSelection, Field, Schedule, Source as Heat};
+use crate::boundary::{Condition, FaceSelection, Field, HeatSource, Schedule};
 use crate::coupling::HealingSettings;
 use crate::material::{ThermalMaterial, fill_elements};
 use crate::mesh::surface::OuterSurface;
@@ -84,7 +84,7 @@ impl PartScene {
             let elements =
                 elements(source, &mesh, &format!("source[{index}].elements"), spec.elements.as_deref())?;
             let power = Field::Uniform(spec.power.build(source, &format!("source[{index}].power"))?);
-            heats.push(Heat { elements, power });
+            heats.push(HeatSource { elements, power });
         }
         let PrintPlan { births, absent, layers, end: default_end } = match &self.print {
             Some(print) => print.plan(source, &mesh, filling.as_ref(), &mut notes).map_err(|fault| {
