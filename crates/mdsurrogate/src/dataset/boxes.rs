@@ -42,7 +42,7 @@ pub(super) struct BoxColumns {
 impl BoxColumns {
     pub fn new(table: &DataTable, prefix: &str) -> Result<Self, Error> {
         let prefixed = |name: &str| format!("{prefix}{name}");
-        let tilted = TILTS.iter().any(|name| table.has(&prefixed(name)));
+        let tilted = TILTS.iter().any(|name| table.contains(&prefixed(name)));
         let tilts = if tilted { Some(table.columns(TILTS.map(prefixed))?) } else { None };
         Ok(Self { lengths: table.columns(LENGTHS.map(prefixed))?, tilts, averaged: !prefix.is_empty() })
     }

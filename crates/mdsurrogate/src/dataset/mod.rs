@@ -21,7 +21,7 @@ pub use statistics::{Leak, Noise, leak, noise};
 pub use strains::read_strains;
 
 use crate::Error;
-use crate::kinematics::{NAMES, cauchy_of_material, material_pair, stretch_of};
+use crate::kinematics::{NAMES, cauchy_of_material, material_pair, stretch_from_c};
 use ndarray::{Array2, ArrayView2};
 use polycore::constitutive::arrays::rows;
 use polycore::tensor::{DeformationGradient, Tensor, Voigt};
@@ -133,7 +133,7 @@ impl Dataset {
         }
         let pairs = rows(c, "C")?.into_iter().zip(rows(s, "S")?);
         let row = |(sample, (c, s)): (usize, (Voigt, Voigt))| -> Result<DataRow, Error> {
-            let deformation = stretch_of(&c)?;
+            let deformation = stretch_from_c(&c)?;
             let cauchy = cauchy_of_material(&deformation, &s);
             Ok(DataRow { sample: sample as u64, time: f64::NAN, deformation, cauchy, c, s, nominal: None })
         };

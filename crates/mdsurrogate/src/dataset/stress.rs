@@ -30,15 +30,15 @@ impl StressColumns {
     /// Finds the stress columns of a table with deformations.
     pub fn find(table: &DataTable, prefix: &str, options: &ReadOptions) -> Result<Self, Error> {
         let named = |pattern: &str| PLACES.map(|place| format!("{prefix}{}", pattern.replace('%', place)));
-        let first = |pattern: &&&str| named(pattern).iter().any(|name| table.has(name));
+        let first = |pattern: &&&str| named(pattern).iter().any(|name| table.contains(name));
         if let Some(pattern) = CAUCHY.iter().find(first) {
             return Ok(Self::Cauchy(table.columns(named(pattern))?));
         }
         // P12 and P21 are both written for an asymmetric tensor only
-        if ["P12", "P21"].iter().all(|name| table.has(name)) {
+        if ["P12", "P21"].iter().all(|name| table.contains(name)) {
             return Ok(Self::First(table.columns(tensor_names("P"))?));
         }
-        if table.has("S11") {
+        if table.contains("S11") {
             return Ok(Self::Second(table.columns(NAMES.map(|name| format!("S{name}")))?));
         }
         if let Some(pattern) = PRESSURE.iter().find(first) {
@@ -55,7 +55,7 @@ impl StressColumns {
             }
             return Ok(Self::Pressure(table.columns(named(pattern))?));
         }
-        if table.has("P11") {
+        if table.contains("P11") {
             let allowed = "nine components of the first Piola–Kirchhoff stress P11 P12 P13 P21 … P33, row by row, or another \
                                        stress sxx … syz or S11 … S23";
             return Err(Error::file(&table.path, "P11 without P12 and P21", allowed));

@@ -1,5 +1,6 @@
 //! Description of a part scene: what it builds, what it leaves out, and how it is solved.
 
+use crate::error::Error;
 use crate::boundary::{Condition, Where};
 use crate::program::observe::observers;
 use crate::program::scene::{PartScene, millimetres};

@@ -88,7 +88,8 @@ impl<D: Dimension + Copy> ScheduleSpec<D> {
         }
         let (times, values) = match &over.file {
             Some(_) if table => {
-                return Err(source.conflict(&format!("{key}.file"), "time", "keep the file or the table"));
+                let (file, time) = (format!("{key}.file"), format!("{key}.time"));
+                return Err(source.conflict(&file, &time, "keep the file or the table"));
             }
             Some(file) => {
                 let path = source.file(file);
@@ -116,7 +117,9 @@ impl<D: Dimension + Copy> TimesSpec<D> {
             return Ok(None);
         }
         if table || self.file.is_some() {
-            return Err(source.conflict(key, "low, high, period", "keep the sine, or the table or file"));
+            let (low, other) = (format!("{key}.low"), if table { "time" } else { "file" });
+            let why = "keep the sine, or the table or file";
+            return Err(source.conflict(&low, &format!("{key}.{other}"), why));
         }
         let missing =
             |name: &str| source.missing(&format!("{key}.{name}"), "a sine needs `low`, `high` and `period`");

@@ -51,7 +51,7 @@ pub fn search(
     let mut trainer = Trainer {
         rows: data.rows(&data.split.train),
         validation: data.rows(&data.split.validation),
-        settings: scene.training.over(&Default::default(), quick),
+        settings: scene.training.combine(&Default::default(), quick),
         done,
         states,
         seconds,

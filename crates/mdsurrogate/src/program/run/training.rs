@@ -78,7 +78,7 @@ pub fn train(
             &rows,
             model.standardised(),
         )?;
-        let settings = model.training.over(&scene.training, quick);
+        let settings = model.training.combine(&scene.training, quick);
         header.provenance.clone_from(&data.set.provenance);
         header.provenance.push(format!(
             "{} {}: {} training rows of a split by {:?} with seed {}; {settings:?}",
