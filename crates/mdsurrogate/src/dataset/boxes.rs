@@ -147,8 +147,9 @@ impl BoxColumns {
                 Err(Error::file(
                     &table.path,
                     format!("no undeformed row{whose} with F11 = F22 = F33 = 1 and lx, ly, lz"),
-                    "such a row in each run; or in the scene `reference = \"run\"` (the first row of each run is undeformed), \
-                                         `reference = \"file\"` (the first row of the file is) or `reference_lengths`",
+                    "such a row in each run; or in the scene `reference = \"run\"` (the first row of each \
+                     run is undeformed), `reference = \"file\"` (the first row of the file is) or \
+                     `reference_lengths`",
                 ))
             }
         }
@@ -200,8 +201,8 @@ fn refuse_ambiguous_steps(
                 return Err(Error::file(
                     &table.path,
                     format!(
-                        "rows too far apart to undo flips of the box: tilt {} changes by {step:.2} of its length up to \
-                                                 line {} (run `{}`, sample {sample})",
+                        "rows too far apart to undo flips of the box: tilt {} changes by {step:.2} of its \
+                         length up to line {} (run `{}`, sample {sample})",
                         TILTS[tilt],
                         table.line(*row),
                         run.id
@@ -245,7 +246,8 @@ fn refuse_averaged_flips(table: &DataTable, run: &TableRun, boxes: &[PeriodicBox
             return Err(Error::file(
                 &table.path,
                 format!(
-                    "the mean tilt avg_{} = {} in line {} (run `{}`, sample {sample}), averaged across a flip of the box",
+                    "the mean tilt avg_{} = {} in line {} (run `{}`, sample {sample}), averaged across a \
+                     flip of the box",
                     TILTS[tilt],
                     boxes[place].tilts[tilt],
                     table.line(row),

@@ -329,7 +329,8 @@ impl Dataset {
                     place: format!("run `{}`, sample {}", path.id, row.sample),
                     quantity: "norm of the stress".into(),
                     found: format!("{:.4e} Pa (90th percentile {usual:.4e} Pa)", row.cauchy.norm()),
-                    allowed: "an outlier above a thousand times the 90th percentile would dominate the training",
+                    allowed: "an outlier above a thousand times the 90th percentile would dominate the \
+                        training",
                 });
             }
         }

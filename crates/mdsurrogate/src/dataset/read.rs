@@ -292,8 +292,8 @@ fn nominal(table: &DataTable) -> Result<Dataset, Error> {
 fn unknown_form(table: &DataTable, columns: SampledColumns) -> Error {
     let headings: Vec<&str> = table.headings.iter().map(|(name, _)| name.as_str()).collect();
     let found = format!("the headings {}", headings.join(", "));
-    let forms = "C11 C22 C33 C12 C13 C23 and S11 … S23, or F11 F12 … F33 or lx ly lz and sxx syy szz sxy sxz syz, \
-                     or (rubber) mode, stretch, nominal_MPa";
+    let forms = "C11 C22 C33 C12 C13 C23 and S11 … S23, or F11 F12 … F33 or lx ly lz and sxx syy szz sxy \
+        sxz syz, or (rubber) mode, stretch, nominal_MPa";
     let allowed = match columns {
         _ if table.contains("F11") => {
             "all nine columns F11 F12 F13 F21 … F33; without shear, add columns of zeros".into()

@@ -48,16 +48,16 @@ impl StressColumns {
                     &table.path,
                     format!("the pressures (p = −σ) {} … {}", names[0], names[5]),
                     format!(
-                        "`stress = \"pressure\"` in `[data]`, which takes σ = −p, or columns {prefix}sxx … {prefix}syz, \
-                                                 positive in tension"
+                        "`stress = \"pressure\"` in `[data]`, which takes σ = −p, or columns {prefix}sxx … \
+                         {prefix}syz, positive in tension"
                     ),
                 ));
             }
             return Ok(Self::Pressure(table.columns(named(pattern))?));
         }
         if table.contains("P11") {
-            let allowed = "nine components of the first Piola–Kirchhoff stress P11 P12 P13 P21 … P33, row by row, or another \
-                                       stress sxx … syz or S11 … S23";
+            let allowed = "nine components of the first Piola–Kirchhoff stress P11 P12 P13 P21 … P33, row \
+                by row, or another stress sxx … syz or S11 … S23";
             return Err(Error::file(&table.path, "P11 without P12 and P21", allowed));
         }
         Ok(Self::Cauchy(table.columns(named(CAUCHY[0]))?))
@@ -83,8 +83,8 @@ impl StressColumns {
             None => Err(Error::file(
                 &table.path,
                 format!("{} without a unit", self.name()),
-                "a unit in the headings, as `pxx [atm]`, or `stress_unit` in the scene (pressures of LAMMPS: 1 atm with \
-                                 `units real`, 1 bar with `units metal`)",
+                "a unit in the headings, as `pxx [atm]`, or `stress_unit` in the scene (pressures of \
+                 LAMMPS: 1 atm with `units real`, 1 bar with `units metal`)",
             )),
         };
         self.columns().iter().map(unit).collect()

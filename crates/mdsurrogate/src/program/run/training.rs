@@ -236,8 +236,9 @@ fn early_stops(model: &Trained) -> Vec<String> {
             if members > 1 { format!(" (member {} of {members})", member + 1) } else { String::new() };
         state.is_best_early().then(|| {
             format!(
-                 "{}{which}: the best epoch is {best} of {epochs}; the validation loss only grew afterwards. Check the \
-                                 learning curve; a smaller learning rate, or validation rows more like the training rows, may help",
+                "{}{which}: the best epoch is {best} of {epochs}; the validation loss only grew \
+                  afterwards. Check the learning curve; a smaller learning rate, or validation rows more \
+                  like the training rows, may help",
                 model.name
             )
         })
