@@ -129,7 +129,7 @@ impl BoxColumns {
             return Ok(reference);
         }
         match options.origin {
-            Some(BoxReference::TableRun) => self.instant(table, run.first),
+            Some(BoxReference::Run) => self.instant(table, run.first),
             Some(BoxReference::File) => {
                 self.instant(table, runs.iter().map(|run| run.first).min().unwrap_or(run.first))
             }

@@ -13,7 +13,7 @@ mod strains;
 mod stress;
 mod table;
 
-pub use options::{BoxReference, LammpsUnits, PROPERTIES, ReadOptions, SampledColumns, StressMeasure};
+pub use options::{BoxReference, LammpsUnits, PROPERTIES, PressureConvention, ReadOptions, SampledColumns};
 pub use read::read;
 pub use split::{DataSplit, Fractions, SplitMethod, split};
 pub use standardise::Standardisation;

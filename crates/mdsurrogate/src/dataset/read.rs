@@ -27,10 +27,9 @@ const FEMTOSECOND: f64 = 1e-15;
 ///   `mode,stretch,nominal_MPa` (a run per mode) or `stretch_1,stretch_2,nominal_1_MPa,nominal_2_MPa`.
 ///
 /// Optional columns: `run_id` (default: a file is one path), `kind`, `rate_x rate_y rate_z` (1/fs), `sample`,
-/// `time_fs`. Stress is in MPa, or in the unit of its heading. Pressures (`pxx …`, σ = −p) need [`StressMeasure`].
+/// `time_fs`. Stress is in MPa, or in the unit of its heading. Pressures (`pxx …`, σ = −p) need
+/// [`ReadOptions::pressure`].
 /// Rows whose averaged cells are all empty (the state before a run) are skipped and counted.
-///
-/// [`StressMeasure`]: super::Measure
 ///
 /// # Errors
 /// Returns file, line, column, value and allowed values, and the errors of [`Dataset::check`].
@@ -123,8 +122,7 @@ impl TableLayout {
         } else {
             return Err(unknown_form(table, options.columns));
         };
-        let stress =
-            if stressed { Some(StressColumns::of_deformation(table, prefix, options)?) } else { None };
+        let stress = if stressed { Some(StressColumns::find(table, prefix, options)?) } else { None };
         let name = match stress {
             None | Some(StressColumns::Cauchy(_)) => name.to_owned(),
             Some(stress) => format!("{name}, {}", stress.name()),
@@ -283,7 +281,7 @@ fn nominal(table: &DataTable) -> Result<Dataset, Error> {
         set.paths.len(),
         set.skipped
     );
-    let more = table.layout_note().map(|_| &reading.layout_note).into_iter().chain(&reading.notes);
+    let more = table.layout_note().map(|_| &reading.understood).into_iter().chain(&reading.notes);
     set.provenance.push(more.fold(line, |line, note| line + "; " + note));
     Ok(set)
 }
@@ -310,7 +308,7 @@ fn unknown_form(table: &DataTable, columns: SampledColumns) -> Error {
 fn table(table: &DataTable, options: &ReadOptions) -> Result<Dataset, Error> {
     let mut options = options.clone();
     if let Some(origin) = table.lammps() {
-        options.origin = options.origin.or(origin.first_is_undeformed.then_some(BoxReference::TableRun));
+        options.origin = options.origin.or(origin.first_is_undeformed.then_some(BoxReference::Run));
     }
     let layout = TableLayout::new(table, &options, true)?;
     let Some(stress) = &layout.stress else { return Ok(Dataset::default()) };

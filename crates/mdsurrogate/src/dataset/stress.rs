@@ -1,6 +1,6 @@
 //! Stress columns in different measures, and their conversion to σ.
 
-use super::options::{PLACES, ReadOptions, StressMeasure};
+use super::options::{PLACES, PressureConvention, ReadOptions};
 use super::table::{ColumnIndex, DataTable};
 use crate::Error;
 use crate::kinematics::{NAMES, cauchy_of_material};
@@ -42,7 +42,7 @@ impl StressColumns {
             return Ok(Self::Second(table.columns(NAMES.map(|name| format!("S{name}")))?));
         }
         if let Some(pattern) = PRESSURE.iter().find(first) {
-            if options.measure != Some(StressMeasure::Pressure) && !table.is_lammps() {
+            if options.pressure != Some(PressureConvention::Pressure) && !table.is_lammps() {
                 let names = named(pattern);
                 return Err(Error::file(
                     &table.path,

@@ -30,7 +30,7 @@ pub fn load(
     let mut options = ReadOptions {
         columns: data.columns,
         origin: data.reference,
-        measure: data.stress,
+        pressure: data.stress,
         units: data.units,
         names: data.names.clone(),
         blocks: data.blocks.clone(),
