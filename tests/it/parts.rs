@@ -79,8 +79,8 @@ fn a_printed_bar() {
     fs::write(here.join("bar.toml"), BAR.replace("stages = 2", &format!("stages = 2\n{solid}"))).unwrap();
     let crystfem = |arguments: &str| finish(command("crystfem", arguments, here).spawn().unwrap());
     let told = crystfem("check bar.toml").with_code(0);
-    told.shows("builds     3 births, 288 elements in all");
-    told.shows("solver     when all is printed: not linear: Newton's iteration");
+    told.shows("builds     3 births with 288 elements in total");
+    told.shows("solver     after the last birth: not linear: Newton's iteration");
     told.shows("leaves out conditions that change over time");
     for threads in 1..=3 {
         crystfem(&format!("run bar.toml --output out{threads} --threads {threads}")).with_code(0);

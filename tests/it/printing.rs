@@ -129,7 +129,7 @@ fn a_path_beside_the_part() {
         let ended = crystfem(&format!("{verb} cube.toml"), here).with_code(2);
         ended.tells(
             "`print.path`: found a path from (105.5, 105.5, 0) mm to (124.5, 124.5, 2) mm whose \
-                     beads cover no",
+                     beads cover no element",
         );
         ended.tells("the part, which reaches from (0, 0, 0) mm to (20, 20, 2) mm");
     }
@@ -137,9 +137,9 @@ fn a_path_beside_the_part() {
     for keys in ["centre = true", "offset = [\"-105 mm\", \"-105 mm\", \"0 mm\"]"] {
         scene(keys);
         let told = crystfem("check cube.toml", here).with_code(0);
-        told.shows("the beads cover 19.0 % of the part; 0.0 % of their length lies outside of it");
-        told.shows("probe `middle` is where nothing is printed");
-        told.shows("304 elements in all");
+        told.shows("the beads cover 19.0 % of the part; 0.0 % of their length lies outside");
+        told.shows("probe `middle` lies where nothing is printed");
+        told.shows("304 elements in total");
     }
     crystfem("run cube.toml --output out", here).with_code(0);
     let series = vtkhdf::read(here.join("out/fields.vtkhdf")).unwrap();
@@ -152,14 +152,11 @@ fn a_path_beside_the_part() {
     scene("offset = [\"-95 mm\", \"-105 mm\", \"0 mm\"]");
     let told = crystfem("check cube.toml", here).with_code(0);
     // of 76 mm of a layer 19 and twice 9.5 lie at x > 20 mm; 38 elements are under the rest
-    told.shows("the beads cover 9.5 % of the part; 50.0 % of their length lies outside of it");
+    told.shows("the beads cover 9.5 % of the part; 50.0 % of their length lies outside");
     scene("centre = true\nfill = true");
     let told = crystfem("check cube.toml", here).with_code(0);
-    told.shows(
-        "the beads cover 19.0 % of the part; 0.0 % of their length lies outside of it; with gaps \
-                filled 100.0 %",
-    );
-    told.shows("1600 elements in all");
+    told.shows("the beads cover 19.0 % of the part; 0.0 % of their length lies outside; with filled gaps 100.0 % are printed");
+    told.shows("1600 elements in total");
 }
 
 /// A table in mm is read as such, and needs no `time.end`.
@@ -172,7 +169,7 @@ fn a_table_of_moves_with_units() {
     let scene = BRICK.replace("wall.gcode\"", "line.csv\"\nwindow = \"0.3 s\"");
     fs::write(here.join("brick.toml"), scene).unwrap();
     let told = crystfem("check brick.toml", here).with_code(0);
-    told.shows("20 elements in all");
+    told.shows("20 elements in total");
     // the last of them is passed at 1.95 s and born at the end of its window, 2.15 s, after the path
     told.shows("ends at    2.4");
     crystfem("run brick.toml --output out", here).with_code(0);

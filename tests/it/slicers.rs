@@ -153,16 +153,16 @@ fn check_tells_what_a_file_prints() {
     );
     told.shows("by feature: `Custom` 35.5 %, ");
     told.shows("`Skirt/Brim` 32.3 %");
-    told.shows("times by the limits that the file states: at the end 500, 500,");
+    told.shows("path times follow the limits in the file: at the end 500, 500,");
     told.shows("9 s as its slicer estimates");
     told.shows(
-        "1 printing moves have no room above the bed (z ≤ 0) or fall through the air, the first in \
+        "1 printing moves lie at or below the bed (z ≤ 0) or have no support, the first in \
                 line 9: 3.23 % of the filament, left out",
     );
-    told.shows("nothing of `support` to leave out; the file prints");
+    told.shows("found no `support` to leave out; the file prints");
     told.shows("left out of the part: 66.7 % of the filament (skirt, purge, support)");
     told.shows("commands not used: M106 P2 (1)");
-    told.shows("`boundary[0].ambient`: the file switches the bed off at");
+    told.shows("`boundary[0].ambient`: the bed is switched off at");
     told.shows("a later `time.end` lets the part cool");
     // the line in the middle alone
     told.shows("1.000 mm³");
@@ -183,7 +183,7 @@ fn check_tells_what_a_file_prints() {
         let told = crystfem("check part.toml", here).with_code(code);
         if code == 2 {
             told.tells(
-                "`mesh.path.leave_out` takes skirts, brims and purge lines out of it (the file names \
+                "`mesh.path.leave_out` removes skirts, brims and purge lines (features of the file: \
                         Perimeter, Support)",
             );
         }
@@ -195,6 +195,6 @@ fn check_tells_what_a_file_prints() {
     fs::write(here.join("part.gcode"), "M200 D1.75\nM83\nM104 S200\nG1 Z.2 F600\nG1 X10 E1\n").unwrap();
     check("filament = \"2.85 mm\"", "\"60 degC\"")
         .with_code(2)
-        .tells("E of the file is a volume (M200) of this diameter");
+        .tells("E in the file is a volume (M200) of this diameter");
     check("", "\"60 degC\"").with_code(0).shows("1.000 mm³ of 0.4 mm");
 }

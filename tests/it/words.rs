@@ -31,7 +31,7 @@ fn slips_are_reported() {
     write("cold.toml", &BAR.replace("ambient = \"100 degC\"", "ambient = \"60 K\""));
     let told = crystfem("check cold.toml", here).with_code(0);
     told.shows("note       `boundary[1].ambient` is 60 K, which is -213.15 °C: is `degC` meant?");
-    told.shows("builds     a mesh that reaches from (-12, -6, -2) mm to (12, 6, 1.5) mm");
+    told.shows("builds     a mesh from (-12, -6, -2) mm to (12, 6, 1.5) mm");
     // a segment that is a jump
     write(
         "point.toml",
@@ -44,7 +44,7 @@ fn slips_are_reported() {
     );
     crystfem("check point.toml", here)
         .with_code(0)
-        .shows("1 segments, 0 s, 1 of them jumps (neither `rate` nor `duration`)");
+        .shows("1 segments, 0 s, 1 of them jumps (without `rate` and `duration`)");
     // a key of a sweep without its block
     write("bar.toml", BAR);
     let ended = crystfem("sweep bar.toml --vary layer_time=5s", here).with_code(2);
@@ -75,9 +75,9 @@ fn a_mesh_without_its_unit() {
     };
     scene("", "0.5 mm");
     let ended = crystfem("check part.toml", here).with_code(2);
-    ended.tells("`mesh.unit`: found nothing, and with the file's unit as 1 m the part is 60 × 10 × 6 m");
+    ended.tells("missing `mesh.unit`: in metres the part is 60 × 10 × 6 m");
     scene("unit = \"1 mm\"", "6 mm");
-    crystfem("check part.toml", here).with_code(0).shows("reaches from (0, 0, 0) mm to (60, 10, 6) mm");
+    crystfem("check part.toml", here).with_code(0).shows("a mesh from (0, 0, 0) mm to (60, 10, 6) mm");
 }
 
 /// The terminal shows a screenful of messages of a run; the file has all.

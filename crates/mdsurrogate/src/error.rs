@@ -83,7 +83,7 @@ pub enum Error {
     /// Training that diverged: its numbers exceed f32.
     #[error(
         "training diverged in epoch {epoch}, batch {batch}: loss {loss} at learning rate {learning_rate:e}; \
-                 use a smaller learning rate (earlier epochs are kept)"
+         use a smaller learning rate (earlier epochs are kept)"
     )]
     Diverged {
         /// Epoch, from 1.

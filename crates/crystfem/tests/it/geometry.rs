@@ -183,7 +183,8 @@ fn node_sets_of_a_deck_are_boundaries() {
     let lines = explain(&source(here, mesh, &(hold("COLD", 20.0) + end)), false).unwrap().join("\n");
     for note in [
         "the part is 8 × 1 × 1 mm",
-        "*CONDUCTIVITY (line 56, `50.,`) is NOT used: the deck has no units; give `conductivity` of [materials.NAME]",
+        "*CONDUCTIVITY (line 56, `50.,`) is NOT used: the deck has no units; give `conductivity` of \
+         [materials.NAME]",
         "*AMPLITUDE (line 58, `RAMP`) is NOT used",
         "*BOUNDARY (line 63, `COLD, 11, 11, 20.`) is NOT used",
         "keywords not used: *END STEP (1), *STEP (1)",
@@ -217,9 +218,8 @@ fn files_of_thermal_analyses_are_opened_by_check() {
         let (ends, kinds) = (array("offsets", "Int32", "3"), array("types", "UInt8", "5"));
         let values = array("T", "Float64", temperatures);
         format!(
-            "<VTKFile type=\"UnstructuredGrid\"><UnstructuredGrid><Piece><Points>{points}</Points>\
-                         <Cells>{cells}{ends}{kinds}</Cells>\
-             <PointData>{values}</PointData></Piece></UnstructuredGrid></VTKFile>"
+            "<VTKFile \
+             type=\"UnstructuredGrid\"><UnstructuredGrid><Piece><Points>{points}</Points><Cells>{cells}{ends}{kinds}</Cells><PointData>{values}</PointData></Piece></UnstructuredGrid></VTKFile>"
         )
     };
     let write = |name: &str, text: &str| fs::write(here.join(name), text).unwrap();
@@ -228,8 +228,8 @@ fn files_of_thermal_analyses_are_opened_by_check() {
     write("short.vtu", &grid("480 470"));
     let series = |file: &str| {
         format!(
-            "<VTKFile><Collection><DataSet timestep=\"0\" file=\"good.vtu\"/>\
-                         <DataSet timestep=\"9\" file=\"{file}\"/></Collection></VTKFile>"
+            "<VTKFile><Collection><DataSet timestep=\"0\" file=\"good.vtu\"/><DataSet timestep=\"9\" \
+             file=\"{file}\"/></Collection></VTKFile>"
         )
     };
     write("good.pvd", &series("good.vtu"));

@@ -42,7 +42,7 @@ pub(super) struct BoxColumns {
 impl BoxColumns {
     pub fn new(table: &DataTable, prefix: &str) -> Result<Self, Error> {
         let prefixed = |name: &str| format!("{prefix}{name}");
-        let tilted = TILTS.iter().any(|name| table.has(&prefixed(name)));
+        let tilted = TILTS.iter().any(|name| table.contains(&prefixed(name)));
         let tilts = if tilted { Some(table.columns(TILTS.map(prefixed))?) } else { None };
         Ok(Self { lengths: table.columns(LENGTHS.map(prefixed))?, tilts, averaged: !prefix.is_empty() })
     }
@@ -129,7 +129,7 @@ impl BoxColumns {
             return Ok(reference);
         }
         match options.origin {
-            Some(BoxReference::TableRun) => self.instant(table, run.first),
+            Some(BoxReference::Run) => self.instant(table, run.first),
             Some(BoxReference::File) => {
                 self.instant(table, runs.iter().map(|run| run.first).min().unwrap_or(run.first))
             }
@@ -147,8 +147,9 @@ impl BoxColumns {
                 Err(Error::file(
                     &table.path,
                     format!("no undeformed row{whose} with F11 = F22 = F33 = 1 and lx, ly, lz"),
-                    "such a row in each run; or in the scene `reference = \"run\"` (the first row of each run is undeformed), \
-                                         `reference = \"file\"` (the first row of the file is) or `reference_lengths`",
+                    "such a row in each run; or in the scene `reference = \"run\"` (the first row of each \
+                     run is undeformed), `reference = \"file\"` (the first row of the file is) or \
+                     `reference_lengths`",
                 ))
             }
         }
@@ -200,8 +201,8 @@ fn refuse_ambiguous_steps(
                 return Err(Error::file(
                     &table.path,
                     format!(
-                        "rows too far apart to undo flips of the box: tilt {} changes by {step:.2} of its length up to \
-                                                 line {} (run `{}`, sample {sample})",
+                        "rows too far apart to undo flips of the box: tilt {} changes by {step:.2} of its \
+                         length up to line {} (run `{}`, sample {sample})",
                         TILTS[tilt],
                         table.line(*row),
                         run.id
@@ -245,7 +246,8 @@ fn refuse_averaged_flips(table: &DataTable, run: &TableRun, boxes: &[PeriodicBox
             return Err(Error::file(
                 &table.path,
                 format!(
-                    "the mean tilt avg_{} = {} in line {} (run `{}`, sample {sample}), averaged across a flip of the box",
+                    "the mean tilt avg_{} = {} in line {} (run `{}`, sample {sample}), averaged across a \
+                     flip of the box",
                     TILTS[tilt],
                     boxes[place].tilts[tilt],
                     table.line(row),

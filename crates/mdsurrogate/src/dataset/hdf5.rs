@@ -11,7 +11,7 @@
 use super::stress::{SymmetryCheck, cauchy_of_first};
 use super::{DataRow, DataSplit, Dataset, Path, Standardisation};
 use crate::Error;
-use crate::kinematics::{cauchy_from_material, material_pair, stretch_of};
+use crate::kinematics::{cauchy_from_material, material_pair, stretch_from_c};
 use polycore::hdf5::{Created, dataset};
 use polycore::tensor::{DeformationGradient, Tensor, Voigt};
 use rust_hdf5::{DatatypeMessage, H5Dataset, H5File, H5Group};
@@ -197,7 +197,7 @@ pub fn read(path: impl AsRef<std::path::Path>) -> Result<Dataset, Error> {
                 (f.map_err(|error| at(error.into()))?, six(cauchy))
             }
             None => {
-                let f = stretch_of(&c).map_err(at)?;
+                let f = stretch_from_c(&c).map_err(at)?;
                 (f, cauchy_from_material(&f, &s))
             }
         };

@@ -267,8 +267,9 @@ pub(super) fn read(
                 format!("{what} whose first row is a mean, and an unknown undeformed box")
             }
         };
-        let allowed = "in `[data]` `reference = \"run\"` (the first row of each run), `reference = \"file\"` (the first \
-                               row of the file, if runs continue each other) or `reference_lengths`; `blocks = [2]` selects runs";
+        let allowed = "in `[data]` `reference = \"run\"` (the first row of each run), `reference = \
+            \"file\"` (the first row of the file, if runs continue each other) or `reference_lengths`; \
+            `blocks = [2]` selects runs";
         return Err(Error::file(path, found, allowed));
     }
     let same =
@@ -348,8 +349,9 @@ fn units(path: &Path, stated: Option<&str>, options: &ReadOptions) -> Result<Opt
 }
 
 fn unusable_file(path: &Path, what: &str, all: &[KnownBlock], options: &ReadOptions) -> Error {
-    let allowed = "`thermo_style custom step … lx ly lz pxx pyy pzz pxy pxz pyz`, in a tilted box also xy xz yz; `names` in \
-                       `[data]` for other columns, e.g. `names = { lx = \"v_lx\", pxx = \"c_p[1]\" }` (`pxy = \"0\"` without shear)";
+    let allowed = "`thermo_style custom step … lx ly lz pxx pyy pzz pxy pxz pyz`, in a tilted box also xy \
+        xz yz; `names` in `[data]` for other columns, e.g. `names = { lx = \"v_lx\", pxx = \"c_p[1]\" }` \
+        (`pxy = \"0\"` without shear)";
     let best = all.iter().min_by_key(|(.., found)| missing_properties(found, options).len());
     let found = match best {
         None => format!("{what} without thermo output in columns or yaml"),

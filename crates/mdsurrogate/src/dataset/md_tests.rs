@@ -165,7 +165,7 @@ fn flips_are_undone() {
 #[test]
 fn stresses_beside_f() {
     let six = |t: Tensor| [t[(0, 0)], t[(1, 1)], t[(2, 2)], t[(0, 1)], t[(0, 2)], t[(1, 2)]];
-    let pressure = ReadOptions { measure: Some(StressMeasure::Pressure), ..ReadOptions::default() };
+    let pressure = ReadOptions { pressure: Some(PressureConvention::Pressure), ..ReadOptions::default() };
     for (heading, unit, options) in [
         ("sxx,syy,szz,sxy,sxz,syz", 1e6, ReadOptions::default()),
         (

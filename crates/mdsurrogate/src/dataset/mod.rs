@@ -13,7 +13,7 @@ mod strains;
 mod stress;
 mod table;
 
-pub use options::{BoxReference, LammpsUnits, PROPERTIES, ReadOptions, SampledColumns, StressMeasure};
+pub use options::{BoxReference, LammpsUnits, PROPERTIES, PressureConvention, ReadOptions, SampledColumns};
 pub use read::read;
 pub use split::{DataSplit, Fractions, SplitMethod, split};
 pub use standardise::Standardisation;
@@ -21,7 +21,7 @@ pub use statistics::{Leak, Noise, leak, noise};
 pub use strains::read_strains;
 
 use crate::Error;
-use crate::kinematics::{NAMES, cauchy_from_material, material_pair, stretch_of};
+use crate::kinematics::{NAMES, cauchy_from_material, material_pair, stretch_from_c};
 use ndarray::{Array2, ArrayView2};
 use polycore::constitutive::arrays::rows;
 use polycore::tensor::{DeformationGradient, Tensor, Voigt};
@@ -133,7 +133,7 @@ impl Dataset {
         }
         let pairs = rows(c, "C")?.into_iter().zip(rows(s, "S")?);
         let row = |(sample, (c, s)): (usize, (Voigt, Voigt))| -> Result<DataRow, Error> {
-            let deformation = stretch_of(&c)?;
+            let deformation = stretch_from_c(&c)?;
             let cauchy = cauchy_from_material(&deformation, &s);
             Ok(DataRow { sample: sample as u64, time: f64::NAN, deformation, cauchy, c, s, nominal: None })
         };
@@ -329,7 +329,8 @@ impl Dataset {
                     place: format!("run `{}`, sample {}", path.id, row.sample),
                     quantity: "norm of the stress".into(),
                     found: format!("{:.4e} Pa (90th percentile {usual:.4e} Pa)", row.cauchy.norm()),
-                    allowed: "an outlier above a thousand times the 90th percentile would dominate the training",
+                    allowed: "an outlier above a thousand times the 90th percentile would dominate the \
+                        training",
                 });
             }
         }

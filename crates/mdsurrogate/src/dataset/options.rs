@@ -32,7 +32,7 @@ pub enum BoxReference {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
-pub enum StressMeasure {
+pub enum PressureConvention {
     /// Pressures as in LAMMPS: σ = −p.
     Pressure,
 }
@@ -101,7 +101,7 @@ pub struct ReadOptions {
     /// Unit of stress, Pa, for columns without `[unit]` in the heading; default MPa (none for pressures).
     pub stress_unit: Option<f64>,
     /// Stress measure of columns `pxx …` in a table; by default they are refused.
-    pub measure: Option<StressMeasure>,
+    pub pressure: Option<PressureConvention>,
     /// Units of LAMMPS output, if the log does not state them.
     pub units: Option<LammpsUnits>,
     /// Headings of the columns, by property (`lx`, `pxx`, `F11`, …).

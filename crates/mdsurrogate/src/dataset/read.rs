@@ -2,11 +2,11 @@
 
 use super::boxes::{BoxColumns, TableRun};
 use super::options::{BoxReference, LENGTHS, ReadOptions, SampledColumns};
-use super::stress::{StressColumns, SymmetryCheck, nine};
+use super::stress::{StressColumns, SymmetryCheck, tensor_names};
 use super::table::{ColumnIndex, DataTable};
 use super::{DataRow, Dataset, Path};
 use crate::Error;
-use crate::kinematics::{NAMES, stretch_of};
+use crate::kinematics::{NAMES, stretch_from_c};
 use polycore::constitutive::{self, hyperelastic};
 use polycore::tensor::{DeformationGradient, Tensor, Voigt};
 use std::collections::HashMap;
@@ -27,10 +27,9 @@ const FEMTOSECOND: f64 = 1e-15;
 ///   `mode,stretch,nominal_MPa` (a run per mode) or `stretch_1,stretch_2,nominal_1_MPa,nominal_2_MPa`.
 ///
 /// Optional columns: `run_id` (default: a file is one path), `kind`, `rate_x rate_y rate_z` (1/fs), `sample`,
-/// `time_fs`. Stress is in MPa, or in the unit of its heading. Pressures (`pxx …`, σ = −p) need [`StressMeasure`].
+/// `time_fs`. Stress is in MPa, or in the unit of its heading. Pressures (`pxx …`, σ = −p) need
+/// [`ReadOptions::pressure`].
 /// Rows whose averaged cells are all empty (the state before a run) are skipped and counted.
-///
-/// [`StressMeasure`]: super::Measure
 ///
 /// # Errors
 /// Returns file, line, column, value and allowed values, and the errors of [`Dataset::check`].
@@ -61,7 +60,7 @@ pub fn read(path: impl AsRef<std::path::Path>, options: &ReadOptions) -> Result<
 
 /// Tells if a table has tests of rubber: stretches or strains, but no tensors or boxes.
 fn is_rubber(table: &DataTable) -> bool {
-    let has_tensors = ["C11", "F11", "lx", "avg_lx", "P11", "S11"].iter().any(|name| table.has(name));
+    let has_tensors = ["C11", "F11", "lx", "avg_lx", "P11", "S11"].iter().any(|name| table.contains(name));
     let words = ["stretch", "strain", "dehnung"];
     let is_stretch = |name: &str| {
         let lower = name.to_lowercase();
@@ -97,7 +96,7 @@ pub(super) struct TableLayout {
 impl TableLayout {
     /// Finds the columns of a table; `stressed` is false for predictions.
     pub fn new(table: &DataTable, options: &ReadOptions, stressed: bool) -> Result<Self, Error> {
-        if table.has("C11") {
+        if table.contains("C11") {
             let names = |letter: &str| NAMES.map(|name| format!("{letter}{name}"));
             require_material(table, [names("C"), names("S")].as_flattened())?;
             let (c, s) = (table.columns(names("C"))?, table.columns(names("S"))?);
@@ -112,19 +111,18 @@ impl TableLayout {
             (_, SampledColumns::Averaged) => ("avg_", "averaged columns"),
             (_, SampledColumns::Instantaneous) => ("", "instantaneous columns"),
         };
-        let form = if table.has("F12") {
+        let form = if table.contains("F12") {
             // a table without averaged columns leaves no choice
             if !prefix.is_empty() && !table.headings.iter().any(|(name, _)| name.starts_with(prefix)) {
                 (prefix, name) = ("", "F");
             }
-            DeformationColumns::Gradient(table.columns(nine("F"))?)
-        } else if LENGTHS.iter().any(|name| table.has(&format!("{prefix}{name}"))) {
+            DeformationColumns::Gradient(table.columns(tensor_names("F"))?)
+        } else if LENGTHS.iter().any(|name| table.contains(&format!("{prefix}{name}"))) {
             DeformationColumns::Box(BoxColumns::new(table, prefix)?)
         } else {
             return Err(unknown_form(table, options.columns));
         };
-        let stress =
-            if stressed { Some(StressColumns::of_deformation(table, prefix, options)?) } else { None };
+        let stress = if stressed { Some(StressColumns::find(table, prefix, options)?) } else { None };
         let name = match stress {
             None | Some(StressColumns::Cauchy(_)) => name.to_owned(),
             Some(stress) => format!("{name}, {}", stress.name()),
@@ -156,7 +154,7 @@ impl TableLayout {
         let deformation = |&(_, row): &(u64, usize)| -> Result<DeformationGradient, Error> {
             match &self.form {
                 DeformationColumns::Material(c) => {
-                    stretch_of(&Voigt::from_row_slice(&table.numbers(row, c)?))
+                    stretch_from_c(&Voigt::from_row_slice(&table.numbers(row, c)?))
                         .map_err(|error| table.at_row(row, error))
                 }
                 DeformationColumns::Gradient(columns) => {
@@ -231,7 +229,7 @@ impl TableLayout {
 /// # Errors
 /// Returns an error for a missing column.
 fn require_material(table: &DataTable, all: &[String]) -> Result<(), Error> {
-    let Some(missing) = all.iter().find(|name| !table.has(name)) else { return Ok(()) };
+    let Some(missing) = all.iter().find(|name| !table.contains(name)) else { return Ok(()) };
     let others = table.headings.iter().map(|(name, _)| name).filter(|name| !all.contains(name));
     let similar = crate::error::nearest(missing, others.map(String::as_str));
     if similar.is_some() {
@@ -269,7 +267,7 @@ fn nominal(table: &DataTable) -> Result<Dataset, Error> {
         // the undeformed state is a condition that each law here satisfies
         if state.nominal != [0.0; 2] {
             let rows = &mut set.paths[run].rows;
-            rows.push(DataRow::of_nominal(rows.len() as u64, state.stretches, state.nominal)?);
+            rows.push(DataRow::from_nominal(rows.len() as u64, state.stretches, state.nominal)?);
         } else {
             set.skipped += 1;
         }
@@ -283,7 +281,7 @@ fn nominal(table: &DataTable) -> Result<Dataset, Error> {
         set.paths.len(),
         set.skipped
     );
-    let more = table.understood().map(|_| &reading.description).into_iter().chain(&reading.notes);
+    let more = table.layout_note().map(|_| &reading.description).into_iter().chain(&reading.notes);
     set.provenance.push(more.fold(line, |line, note| line + "; " + note));
     Ok(set)
 }
@@ -292,13 +290,13 @@ fn nominal(table: &DataTable) -> Result<Dataset, Error> {
 fn unknown_form(table: &DataTable, columns: SampledColumns) -> Error {
     let headings: Vec<&str> = table.headings.iter().map(|(name, _)| name.as_str()).collect();
     let found = format!("the headings {}", headings.join(", "));
-    let forms = "C11 C22 C33 C12 C13 C23 and S11 … S23, or F11 F12 … F33 or lx ly lz and sxx syy szz sxy sxz syz, \
-                     or (rubber) mode, stretch, nominal_MPa";
+    let forms = "C11 C22 C33 C12 C13 C23 and S11 … S23, or F11 F12 … F33 or lx ly lz and sxx syy szz sxy \
+        sxz syz, or (rubber) mode, stretch, nominal_MPa";
     let allowed = match columns {
-        _ if table.has("F11") => {
+        _ if table.contains("F11") => {
             "all nine columns F11 F12 F13 F21 … F33; without shear, add columns of zeros".into()
         }
-        SampledColumns::Averaged if table.has("lx") => {
+        SampledColumns::Averaged if table.contains("lx") => {
             "avg_lx … avg_syz, or lx … syz with `columns = \"instantaneous\"` (`--instantaneous`)".into()
         }
         SampledColumns::Averaged => format!("{forms}; boxes and their stresses with the prefix `avg_`"),
@@ -310,7 +308,7 @@ fn unknown_form(table: &DataTable, columns: SampledColumns) -> Error {
 fn table(table: &DataTable, options: &ReadOptions) -> Result<Dataset, Error> {
     let mut options = options.clone();
     if let Some(origin) = table.lammps() {
-        options.origin = options.origin.or(origin.first_is_undeformed.then_some(BoxReference::TableRun));
+        options.origin = options.origin.or(origin.first_is_undeformed.then_some(BoxReference::Run));
     }
     let layout = TableLayout::new(table, &options, true)?;
     let Some(stress) = &layout.stress else { return Ok(Dataset::default()) };
@@ -358,7 +356,7 @@ fn table(table: &DataTable, options: &ReadOptions) -> Result<Dataset, Error> {
         set.paths.len(),
         set.skipped
     );
-    if let Some(how) = table.understood() {
+    if let Some(how) = table.layout_note() {
         line += "; ";
         line += &how;
     }

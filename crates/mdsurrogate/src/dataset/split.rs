@@ -116,8 +116,8 @@ fn deal(order: &[usize], shares: [f64; 3], item: &str) -> Result<Vec<u8>, Error>
             what: "split",
             found: format!("{} {item}{}", order.len(), if order.len() == 1 { "" } else { "s" }),
             allowed: format!(
-                "at least {wanted} {item}s, one for each set (or `by = \"random\"`, or fewer sets); a table without \
-                                 the column `run_id` is one path"
+                "at least {wanted} {item}s, one for each set (or `by = \"random\"`, or fewer sets); a table \
+                 without the column `run_id` is one path"
             ),
         });
     }

@@ -59,8 +59,8 @@ pub fn read_strains(path: impl AsRef<std::path::Path>) -> Result<Vec<Voigt>, Err
     let mut options = ReadOptions::default();
     let table = DataTable::read(path, &options)?;
     let known = crate::kinematics::NAMES.map(|name| format!("C{name}"));
-    if table.has("stretch_1") || table.has("stretch") {
-        if table.has("mode") && !table.has("stretch_1") {
+    if table.contains("stretch_1") || table.contains("stretch") {
+        if table.contains("mode") && !table.contains("stretch_1") {
             let allowed =
                 "stretch_1 and stretch_2 (equal in equibiaxial tension, stretch_2 = 1 in pure shear)";
             return Err(Error::file(path, "a mode with one stretch only", allowed));
@@ -70,8 +70,8 @@ pub fn read_strains(path: impl AsRef<std::path::Path>) -> Result<Vec<Voigt>, Err
             |row| stretches.row(&table, row).map(|[x, y, z]| Voigt::new(x * x, y * y, z * z, 0.0, 0.0, 0.0));
         return (0..table.rows()).map(c).collect();
     }
-    let boxed = |prefix: &str| table.has(&format!("{prefix}lx"));
-    if !table.has("C11") && (table.has("F12") || boxed("avg_") || boxed("")) {
+    let boxed = |prefix: &str| table.contains(&format!("{prefix}lx"));
+    if !table.contains("C11") && (table.contains("F12") || boxed("avg_") || boxed("")) {
         if !boxed("avg_") {
             options.columns = SampledColumns::Instantaneous;
         }

@@ -1,6 +1,6 @@
 //! Stress columns in different measures, and their conversion to σ.
 
-use super::options::{PLACES, ReadOptions, StressMeasure};
+use super::options::{PLACES, PressureConvention, ReadOptions};
 use super::table::{ColumnIndex, DataTable};
 use crate::Error;
 use crate::kinematics::{NAMES, cauchy_from_material};
@@ -30,34 +30,34 @@ impl StressColumns {
     /// Finds the stress columns of a table with deformations.
     pub fn find(table: &DataTable, prefix: &str, options: &ReadOptions) -> Result<Self, Error> {
         let named = |pattern: &str| PLACES.map(|place| format!("{prefix}{}", pattern.replace('%', place)));
-        let first = |pattern: &&&str| named(pattern).iter().any(|name| table.has(name));
+        let first = |pattern: &&&str| named(pattern).iter().any(|name| table.contains(name));
         if let Some(pattern) = CAUCHY.iter().find(first) {
             return Ok(Self::Cauchy(table.columns(named(pattern))?));
         }
         // P12 and P21 are both written for an asymmetric tensor only
-        if ["P12", "P21"].iter().all(|name| table.has(name)) {
+        if ["P12", "P21"].iter().all(|name| table.contains(name)) {
             return Ok(Self::First(table.columns(tensor_names("P"))?));
         }
-        if table.has("S11") {
+        if table.contains("S11") {
             return Ok(Self::Second(table.columns(NAMES.map(|name| format!("S{name}")))?));
         }
         if let Some(pattern) = PRESSURE.iter().find(first) {
-            if options.measure != Some(StressMeasure::Pressure) && !table.is_lammps() {
+            if options.pressure != Some(PressureConvention::Pressure) && !table.is_lammps() {
                 let names = named(pattern);
                 return Err(Error::file(
                     &table.path,
                     format!("the pressures (p = −σ) {} … {}", names[0], names[5]),
                     format!(
-                        "`stress = \"pressure\"` in `[data]`, which takes σ = −p, or columns {prefix}sxx … {prefix}syz, \
-                                                 positive in tension"
+                        "`stress = \"pressure\"` in `[data]`, which takes σ = −p, or columns {prefix}sxx … \
+                         {prefix}syz, positive in tension"
                     ),
                 ));
             }
             return Ok(Self::Pressure(table.columns(named(pattern))?));
         }
-        if table.has("P11") {
-            let allowed = "nine components of the first Piola–Kirchhoff stress P11 P12 P13 P21 … P33, row by row, or another \
-                                       stress sxx … syz or S11 … S23";
+        if table.contains("P11") {
+            let allowed = "nine components of the first Piola–Kirchhoff stress P11 P12 P13 P21 … P33, row \
+                by row, or another stress sxx … syz or S11 … S23";
             return Err(Error::file(&table.path, "P11 without P12 and P21", allowed));
         }
         Ok(Self::Cauchy(table.columns(named(CAUCHY[0]))?))
@@ -83,8 +83,8 @@ impl StressColumns {
             None => Err(Error::file(
                 &table.path,
                 format!("{} without a unit", self.name()),
-                "a unit in the headings, as `pxx [atm]`, or `stress_unit` in the scene (pressures of LAMMPS: 1 atm with \
-                                 `units real`, 1 bar with `units metal`)",
+                "a unit in the headings, as `pxx [atm]`, or `stress_unit` in the scene (pressures of \
+                 LAMMPS: 1 atm with `units real`, 1 bar with `units metal`)",
             )),
         };
         self.columns().iter().map(unit).collect()

@@ -38,7 +38,7 @@ pub(super) struct DataTable {
     pub headings: Vec<(String, Option<String>)>,
     cells: TableCells,
     /// Interpretation of LAMMPS output.
-    lammps: Option<lammps::BoxReference>,
+    lammps: Option<lammps::LammpsReading>,
 }
 
 /// Index of a column.
@@ -101,7 +101,7 @@ impl DataTable {
     }
 
     /// Returns the interpretation of LAMMPS output.
-    pub fn lammps(&self) -> Option<&lammps::BoxReference> {
+    pub fn lammps(&self) -> Option<&lammps::LammpsReading> {
         self.lammps.as_ref()
     }
 

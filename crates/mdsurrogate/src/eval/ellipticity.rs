@@ -1,7 +1,7 @@
 //! Loss of ellipticity of a law in its training range.
 
 use crate::Error;
-use crate::kinematics::stretch_of;
+use crate::kinematics::stretch_from_c;
 use nalgebra::{Matrix3, Vector3};
 use polycore::constitutive::{Law, Workspace};
 use polycore::tensor::{Tensor, Voigt, voigt};
@@ -37,7 +37,7 @@ impl Ellipticity {
         let mut memory = Workspace::default();
         let mut found: Option<Self> = None;
         for c in strains {
-            let f = stretch_of(c)?;
+            let f = stretch_from_c(c)?;
             let answer = law.tangent(c, &mut memory)?;
             let tangent = answer.tangent.unwrap_or_default();
             let moduli = voigt::nominal_tangent(&f, &answer.stress, &tangent);

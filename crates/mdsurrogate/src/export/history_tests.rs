@@ -99,8 +99,8 @@ contains
         double precision, intent(in) :: f(3, 3)
         logical, intent(in) :: back
         double precision :: cauchy(6), ddsdde(6, 6), unused, six(6), two(2), square(3, 3), pnewdt, one(1)
-         double precision :: e(3, 3), emec(6), s(6), stiff(21), up(6), low(6), dense(6, 6), worst, none(21)
-                double precision :: energies(2)
+        double precision :: e(3, 3), emec(6), s(6), stiff(21), up(6), low(6), dense(6, 6), worst, none(21)
+        double precision :: energies(2)
         integer :: jstep(4), a, b
         unused = 0
         six = 0
@@ -110,8 +110,8 @@ contains
         pnewdt = 1
         one = 1d6
         energies = 0
-         call umat(cauchy, statev, ddsdde, energies(1), energies(2), unused, unused, six, six, unused, six, six, &
-                    two, unused, unused, unused, two, two, repeat('x', 80), 3, 3, 6, 3, one, 1, two, square, pnewdt, &
+        call umat(cauchy, statev, ddsdde, energies(1), energies(2), unused, unused, six, six, unused, six, six, &
+            two, unused, unused, unused, two, two, repeat('x', 80), 3, 3, 6, 3, one, 1, two, square, pnewdt, &
             unused, square, f, 1, 1, 1, 1, jstep, 1)
         e = matmul(transpose(f), f) / 2
         emec = [e(1, 1) - 0.5d0, e(2, 2) - 0.5d0, e(3, 3) - 0.5d0, e(1, 2), e(1, 3), e(2, 3)]
@@ -151,8 +151,9 @@ contains
         list = 1
         pnewdt = -1
         one = 1d6
-         call umat_user(repeat('x', 80), 1, 1, -101, one, emec, six, six, square, unused, square, unused, list, &
-                    unused, unused, unused, unused, icmd, 0, list, 3, before, after, s, stiff, 0, three, orab, pnewdt, list)
+        call umat_user(repeat('x', 80), 1, 1, -101, one, emec, six, six, square, unused, square, unused, list, &
+            unused, unused, unused, unused, icmd, 0, list, 3, before, after, s, stiff, 0, three, orab, pnewdt, &
+            list)
     end subroutine material
 end program main
 ";
@@ -167,9 +168,9 @@ fn calculix_follows_the_history() {
     hosts::link_calculix(&source, &[&file("law.f90")], &[], &file("ccx"));
     let mut deck = String::from(
         "*NODE, NSET=ALL\n1,0,0,0\n2,1,0,0\n3,1,1,0\n4,0,1,0\n5,0,0,1\n6,1,0,1\n7,1,1,1\n8,0,1,1\n\
-                 *ELEMENT, TYPE=C3D8, ELSET=CUBE\n1,1,2,3,4,5,6,7,8\n*MATERIAL, NAME=USER_LAW\n\
-                 *USER MATERIAL, CONSTANTS=1\n1.0e6\n\
-         *DEPVAR\n3\n*SOLID SECTION, ELSET=CUBE, MATERIAL=USER_LAW\n",
+         *ELEMENT, TYPE=C3D8, ELSET=CUBE\n1,1,2,3,4,5,6,7,8\n*MATERIAL, NAME=USER_LAW\n\
+         *USER MATERIAL, CONSTANTS=1\n1.0e6\n*DEPVAR\n3\n\
+         *SOLID SECTION, ELSET=CUBE, MATERIAL=USER_LAW\n",
     );
     let corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]];
     for f in path() {

@@ -199,8 +199,8 @@ contains
         double precision :: statev(2), pnewdt, sse
         integer :: flags, status
         cg = matmul(transpose(f), f)
-         call law([cg(1, 1), cg(2, 2), cg(3, 3), cg(1, 2), cg(1, 3), cg(2, 3)], s, tangent, energy, spread, &
-                    flags, status)
+        call law([cg(1, 1), cg(2, 2), cg(3, 3), cg(1, 2), cg(1, 3), cg(2, 3)], s, tangent, energy, spread, &
+            flags, status)
         print '(2i6, 44es26.17e3)', status, flags, s, transpose(tangent), energy, spread
         call material(f, 6, stress, stiffness, statev, pnewdt, sse)
         print '(46es26.17e3)', stress, transpose(stiffness), statev, pnewdt, sse
@@ -223,10 +223,9 @@ contains
         one = 1d6
         stress = 0
         stored = -7
-         call umat(stress, statev, stiffness, stored, unused, unused, unused, list(:n), list(:n), unused, &
-                    list(:n), list(:n), two, unused, unused, unused, two, two, cmname, 3, n - 3, n, 2, one, 1, two, square, &
-             pnewdt, unused, &
-            square, f, 1, 1, 1, 1, jstep, 1)
+        call umat(stress, statev, stiffness, stored, unused, unused, unused, list(:n), list(:n), unused, &
+            list(:n), list(:n), two, unused, unused, unused, two, two, cmname, 3, n - 3, n, 2, one, 1, two, &
+            square, pnewdt, unused, square, f, 1, 1, 1, 1, jstep, 1)
         if (present(sse)) sse = stored
     end subroutine material
 end program main

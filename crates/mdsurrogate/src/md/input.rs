@@ -270,7 +270,9 @@ fn unloading(protocol: &Protocol, run: &MdRun, pulled: &[(usize, f64)]) -> (Stri
     (
         first,
         format!(
-            "unfix           pull\nfix             pull all deform 1{back} remap x units boxFLIP\nrun             {left}\n"
+            "unfix           pull\n\
+             fix             pull all deform 1{back} remap x units boxFLIP\n\
+             run             {left}\n"
         ),
     )
 }

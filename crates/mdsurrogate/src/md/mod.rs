@@ -279,8 +279,8 @@ impl MdRun {
             Error::parameter(
                 "path",
                 found,
-                "x, y, z, xy, xz, yz with a rate in 1/fs each, as `x=1e-5,xy=2e-5`, and `unload` with a fraction \
-                                 between 0 and 1",
+                "x, y, z, xy, xz, yz with a rate in 1/fs each, as `x=1e-5,xy=2e-5`, and `unload` with a \
+                 fraction between 0 and 1",
             )
         };
         let (mut rates, mut unload) = ([None; 6], None);

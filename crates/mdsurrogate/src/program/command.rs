@@ -4,7 +4,7 @@
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
 use crate::Error;
-use crate::dataset::{BoxReference, LammpsUnits, ReadOptions, SampledColumns, StressMeasure, read};
+use crate::dataset::{BoxReference, LammpsUnits, PressureConvention, ReadOptions, SampledColumns, read};
 use crate::export::{CSource, OnnxOptions, c_source, fortran_source, onnx};
 use crate::program::run::{Mdsurrogate, describe};
 use crate::surrogate::Surrogate;
@@ -106,7 +106,7 @@ fn read_options(
         columns: if instantaneous { SampledColumns::Instantaneous } else { SampledColumns::Averaged },
         units: units.transpose()?,
         origin: origin.transpose()?,
-        measure: pressure.then_some(StressMeasure::Pressure),
+        pressure: pressure.then_some(PressureConvention::Pressure),
         ..ReadOptions::default()
     })
 }

@@ -19,8 +19,8 @@ pub(super) struct Examples {
     slopes: Vec<f32>,
     /// Targets in units of [`units`], (rows, 6).
     s: Vec<f32>,
-    /// Maps from S to the measured stresses ([`DataRow::elimination`]), (rows, 36); empty if all rows have full
-    /// stresses.
+    /// Maps from S to the measured stresses ([`DataRow::elimination`]), (rows, 36); empty if all rows have
+    /// full stresses.
     maps: Vec<f32>,
     /// Variances of the components of S, MPa².
     variances: [f64; 6],

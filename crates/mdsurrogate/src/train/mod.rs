@@ -1,9 +1,9 @@
 //! Training of laws with [burn](https://burn.dev): loss (3.12), Adam, early stopping, and resumption after
 //! interruptions.
 //!
-//! [`fit`] trains a law to the end; [`Training`] trains one network epoch by epoch. Its [`TrainingState`] contains
-//! everything that changes: a training resumed from a stored state gives bit-identical weights, as does a
-//! repetition. [`ensemble`] combines several networks in a law; [`Surrogate::with_spread_limit`] sets the
+//! [`fit`] trains a law to the end; [`Training`] trains one network epoch by epoch. Its [`TrainingState`]
+//! contains everything that changes: a training resumed from a stored state gives bit-identical weights, as
+//! does a repetition. [`ensemble`] combines several networks in a law; [`Surrogate::with_spread_limit`] sets the
 //! limit of their disagreement.
 //!
 //! ```
@@ -20,11 +20,12 @@
 //!     let stretch = 0.9 + 0.003 * f64::from(sample);
 //!     let f = DeformationGradient::new(Tensor::new(stretch, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0))?;
 //!     let s = Voigt::new(1e9 * (stretch * stretch - 1.0) / 2.0, 0.0, 0.0, 0.0, 0.0, 0.0);
-//!     rows.push(Row::new(sample as u64, f64::NAN, f, cauchy_from_material(&f, &s)));
+//!     rows.push(DataRow::new(sample as u64, f64::NAN, f, cauchy_from_material(&f, &s)));
 //! }
 //! let rows: Vec<&DataRow> = rows.iter().collect();
 //! let architecture = Architecture::new(7, &[(16, Softplus)], 1);
-//! let header = mdsurrogate::fitted::header(Kind::energy(Symmetry::Orthotropic), architecture, 1, &rows, true)?;
+//! let kind = Kind::energy(Symmetry::Orthotropic);
+//! let header = mdsurrogate::fitted::header(kind, architecture, 1, &rows, true)?;
 //! let settings = Settings { epochs: 200, batch: 16, ..Settings::default() };
 //! let (law, _) = fit(header, &rows, &[], settings)?;
 //! let stress = law.stress(&Voigt::new(1.1, 1.0, 1.0, 0.0, 0.0, 0.0), &mut Workspace::default())?.stress;

@@ -98,8 +98,8 @@ fn materials(source: &Source) -> Result<Vec<(String, MaterialSpec, String)>, Fai
             Ok(all.into_iter().map(|(name, spec, key)| (name, spec.clone(), key)).collect())
         }
         SceneKind::Fit => {
-            let allowed = "a scene with `[material]` or `[materials]`: \
-                           the run writes the fitted constants as a block for it";
+            let allowed = "a scene with `[material]` or `[materials]`: the run writes the fitted constants \
+                as a block for it";
             Err(source.error("fit", "a fit scene, which has no material", allowed).into())
         }
     }

@@ -1,6 +1,7 @@
 //! Description of a part scene: what it builds, what it leaves out, and how it is solved.
 
 use crate::boundary::{Condition, FaceSelection};
+use crate::error::Error;
 use crate::program::observe::observers;
 use crate::program::scene::{PartScene, millimetres};
 use crate::simulation::Simulation;
@@ -31,7 +32,8 @@ pub fn explain_scene(
     let births = problem.births.len();
     if births > 0 {
         lines.push(format!(
-            "builds     {births} births with {} elements in total; elements have no equations before their birth",
+            "builds     {births} births with {} elements in total; elements have no equations before their \
+             birth",
             task.printed.len()
         ));
     }
@@ -45,18 +47,19 @@ pub fn explain_scene(
     if let Some(mechanics) = &task.mechanics {
         let [bearing, shapes] = mechanics.counts;
         lines.push(format!(
-             "builds     stress of {bearing} elements of {shapes} shapes, {} nodes on the bed{}; solved whenever \
-                             the free strain changes by {:e}, with about 45 matrix products per element",
+            "builds     stress of {bearing} elements of {shapes} shapes, {} nodes on the bed{}; solved \
+              whenever the free strain changes by {:e}, with about 45 matrix products per element",
             mechanics.settings.bed.len(),
             if mechanics.settings.release { ", released at the end" } else { "" },
-             mechanics.settings.strain_step
+            mechanics.settings.strain_step
         ));
     }
     if task.mechanics.as_ref().is_some_and(|mechanics| mechanics.stiff) {
         // second-order elements cannot be printed
         let advice = if births > 0 { "use hexahedra" } else { "use `mesh.order = 2` or hexahedra" };
         lines.push(format!(
-             "note       4-node tetrahedra are far too stiff in bending: warpage and stress are rough; {advice}"
+            "note       4-node tetrahedra are far too stiff in bending: warpage and stress are rough; \
+              {advice}"
         ));
     }
     if let Some(interfaces) = &task.interfaces {

@@ -35,9 +35,9 @@ impl FinishedFit {
         };
         let [rate, nucleation, n] = ["growth_rate", "nucleation", "avrami_exponent"].map(estimate);
         Some(format!(
-            "kinetics = {{ growth_rate = \"{:.6e} 1/s\", nucleation = \"{:.6e} K^2\", \
-                         activation_energy = \"{activation_energy} J/mol\", equilibrium_melting = \"{equilibrium_melting} K\", \
-                         frozen = \"{frozen} K\", avrami_exponent = {:.5} }}\n",
+            "kinetics = {{ growth_rate = \"{:.6e} 1/s\", nucleation = \"{:.6e} K^2\", activation_energy = \
+             \"{activation_energy} J/mol\", equilibrium_melting = \"{equilibrium_melting} K\", frozen = \
+             \"{frozen} K\", avrami_exponent = {:.5} }}\n",
             rate?, nucleation?, n?
         ))
     }

@@ -22,7 +22,7 @@ type AnalysisNode = MaterialPoint<3>;
 ///
 /// # Errors
 /// As [`run`], for the first time only.
-pub fn explain(spec: &AnalysisNodesSpec, path: &Path) -> Result<String, Error> {
+pub fn explain(spec: &NodesSpec, path: &Path) -> Result<String, Error> {
     let mut analysis = thermal::open(path, spec.array.as_deref())?;
     let Some(first) = analysis.frames.next().transpose()? else {
         return Err(no_temperatures(path));
@@ -41,7 +41,7 @@ fn no_temperatures(path: &Path) -> Error {
 }
 
 /// Converts the temperatures of one time to K.
-fn kelvin(spec: &AnalysisNodesSpec, path: &Path, frame: &thermal::ThermalFrame) -> Result<Vec<f64>, Error> {
+fn kelvin(spec: &NodesSpec, path: &Path, frame: &thermal::ThermalFrame) -> Result<Vec<f64>, Error> {
     let kelvin: Vec<f64> = frame.temperature.iter().map(|value| value + spec.zero()).collect();
     let Some(wrong) = kelvin.iter().find(|kelvin| !(kelvin.is_finite() && **kelvin > 0.0)) else {
         return Ok(kelvin);
@@ -57,7 +57,7 @@ fn kelvin(spec: &AnalysisNodesSpec, path: &Path, frame: &thermal::ThermalFrame) 
 /// # Errors
 /// Returns an error for an unreadable file, temperatures below 0 K, decreasing times and I/O errors.
 pub fn run(
-    spec: &AnalysisNodesSpec,
+    spec: &NodesSpec,
     name: &str,
     path: &Path,
     material: &dyn ThermalMaterial,

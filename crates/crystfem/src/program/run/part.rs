@@ -93,8 +93,8 @@ pub fn warnings(report: &Report) -> String {
         let Value::Scalar { value, .. } = value else { continue };
         if *value > 1.0 && name.rsplit('.').next() == Some(q::MISES_OVER_STRENGTH.name) {
             lines += &format!(
-                "warning: {name} = {value:.3}: the largest Mises stress exceeds the strength; yielding and fracture \
-                                 are not modelled\n"
+                "warning: {name} = {value:.3}: the largest Mises stress exceeds the strength; yielding and \
+                 fracture are not modelled\n"
             );
         }
     }

@@ -1,6 +1,6 @@
 //! Run of a point scene: curves, events and pictures of the material alone.
 
-use super::draw::{self, Run};
+use super::draw::{self, PointRun};
 use crate::error::Error;
 use crate::point::{CurveEvent, Curves, Drive, PointProcess, Stepping};
 use crate::program::observe::celsius::CELSIUS;

@@ -52,9 +52,10 @@ pub(super) fn with_times(
             }
             None => {
                 notes.push(
-                                        "path times follow F: the file has no acceleration limits; waits for temperatures are ignored"
-                                            .into(),
-                                    );
+                    "path times follow F: the file has no acceleration limits; waits for temperatures are \
+                     ignored"
+                        .into(),
+                );
                 (path, "at F")
             }
         },
@@ -83,8 +84,8 @@ pub(super) fn without_loose_beads(
 ) -> Result<ToolPath, SceneError> {
     if let Some((count, line, share)) = path.remove_loose() {
         let text = format!(
-            "{count} printing moves lie at or below the bed (z ≤ 0) or have no support, the first in line {line}: \
-                     {:.2} % of the filament",
+            "{count} printing moves lie at or below the bed (z ≤ 0) or have no support, the first in line \
+             {line}: {:.2} % of the filament",
             100.0 * share
         );
         if share > MOST_LOOSE {

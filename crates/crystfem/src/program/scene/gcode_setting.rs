@@ -90,11 +90,8 @@ impl<D: Dimension + Copy> TimesSpec<D> {
         let fault =
             |name: &str, found: &str, allowed: &str| source.error(&format!("{key}.{name}"), found, allowed);
         if self.file.is_some() && (table || self.period.is_some()) {
-            return Err(source.conflict(
-                &format!("{key}.of"),
-                "time, value, period",
-                "keep `file` and `of`, or the others",
-            ));
+            let other = format!("{key}.{}", if table { "time" } else { "period" });
+            return Err(source.conflict(&format!("{key}.of"), &other, "keep one of them"));
         }
         let path = self.path(source, key)?;
         let setting = match of {

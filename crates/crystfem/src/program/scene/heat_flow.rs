@@ -126,7 +126,8 @@ impl FitSpec {
             (Err(_), _) => located(source, &key("file"), &error),
             (Ok(_), None) => {
                 let why = format!(
-                    "the heat flow of {} is a power; write the mass of the sample, e.g. \"5.2 mg\", or a column in W/g",
+                    "the heat flow of {} is a power; write the mass of the sample, e.g. \"5.2 mg\", or a \
+                     column in W/g",
                     data.file.display()
                 );
                 source.missing(&key("mass"), why)

@@ -436,7 +436,8 @@ impl<D: Dimension> schemars::JsonSchema for PropertySpec<D> {
                      "temperature": {
                                             "type": "array", "items": temperature, "description": "Temperatures, increasing.",
                                         },
-                    "value": { "type": "array", "items": constant, "description": "Value at each temperature." },
+                    "value": { "type": "array", "items": constant, "description": "Value at each \
+                        temperature." },
                 },
                 "required": ["temperature", "value"],
                 "additionalProperties": false,

@@ -131,8 +131,8 @@ impl PartScene {
         let others = all().filter(|nodes| !is_supported(nodes.len())).count();
         if others > 0 {
             let found = format!("a mesh with {others} wedges or second-order hexahedra");
-            let allowed = "8-node hexahedra, 4- or 10-node tetrahedra (meshers produce tetrahedra for any shape; \
-                                       so does `cells` of a bar or brick)";
+            let allowed = "8-node hexahedra, 4- or 10-node tetrahedra (meshers produce tetrahedra for any \
+                shape; so does `cells` of a bar or brick)";
             return Err(source.error("mechanics", found, allowed));
         }
         let share = |given: Option<Ratio>| given.map_or(0.0, |ratio| ratio.si());

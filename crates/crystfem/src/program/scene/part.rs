@@ -244,9 +244,10 @@ impl PartScene {
         let count = every / step;
         let cuts = (count - count.round()).abs() > 1e-9 * count || count < 0.5;
         cuts.then(|| {
-             format!(
-                            "`output.every` of {every} s is no multiple of `time.step` = {step} s: some steps are shortened"
-                        )
+            format!(
+                "`output.every` of {every} s is no multiple of `time.step` = {step} s: some steps are \
+                 shortened"
+            )
         })
     }
 

@@ -122,7 +122,8 @@ impl PrintSpec {
                 boxed(tool.bounds(bead))
             );
             let allowed = format!(
-                "a path over the part, which reaches {} (`centre = true` centers the path, `offset` shifts it)",
+                "a path over the part, which reaches {} (`centre = true` centers the path, `offset` shifts \
+                 it)",
                 boxed(mesh.bounds_of(&elements))
             );
             return Err(source.error("print.path", found, allowed));
@@ -142,7 +143,8 @@ impl PrintSpec {
             let ratio = (whole - volume(&activation.missed)) / extruded;
             if !(RATIOS[0]..=RATIOS[1]).contains(&ratio) {
                 notes.push(format!(
-                     "the printed elements have {ratio:.3} times the extruded volume of the file (use `[mesh.path]` to print it)"
+                    "the printed elements have {ratio:.3} times the extruded volume of the file (use \
+                      `[mesh.path]` to print it)"
                 ));
             }
         }

@@ -188,8 +188,8 @@ impl PartScene {
                 if let Some((off, then)) = given.still_hot(source, &key, end)? {
                     let celsius = then - 273.15;
                     notes.push(format!(
-                         "`{key}`: the bed is switched off at {off:.1} s and still has {celsius:.1} °C at the end of \
-                                                 the run, {end:.1} s; a later `time.end` lets the part cool"
+                        "`{key}`: the bed is switched off at {off:.1} s and still has {celsius:.1} °C at \
+                          the end of the run, {end:.1} s; a later `time.end` lets the part cool"
                     ));
                 }
             }
@@ -216,7 +216,8 @@ impl PartScene {
             if place.distance() > 0.0 {
                 let (name, distance) = (&probe.name, 1e3 * place.distance());
                 notes.push(format!(
-                    "probe `{name}` lies {distance:.4} mm outside the mesh: values are those of the nearest element"
+                    "probe `{name}` lies {distance:.4} mm outside the mesh: values are those of the nearest \
+                     element"
                 ));
             }
             places.push(place);

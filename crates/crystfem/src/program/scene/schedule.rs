@@ -88,7 +88,8 @@ impl<D: Dimension + Copy> ScheduleSpec<D> {
         }
         let (times, values) = match &over.file {
             Some(_) if table => {
-                return Err(source.conflict(&format!("{key}.file"), "time", "keep the file or the table"));
+                let (file, time) = (format!("{key}.file"), format!("{key}.time"));
+                return Err(source.conflict(&file, &time, "keep the file or the table"));
             }
             Some(file) => {
                 let path = source.file(file);
@@ -116,7 +117,9 @@ impl<D: Dimension + Copy> TimesSpec<D> {
             return Ok(None);
         }
         if table || self.file.is_some() {
-            return Err(source.conflict(key, "low, high, period", "keep the sine, or the table or file"));
+            let (low, other) = (format!("{key}.low"), if table { "time" } else { "file" });
+            let why = "keep the sine, or the table or file";
+            return Err(source.conflict(&low, &format!("{key}.{other}"), why));
         }
         let missing =
             |name: &str| source.missing(&format!("{key}.{name}"), "a sine needs `low`, `high` and `period`");
@@ -132,8 +135,8 @@ impl<D: Dimension> TextOrTable for ScheduleSpec<D> {
     type Table = TimesSpec<D>;
 
     fn expected() -> String {
-        let others = "{ time = […], value = […] }, { file = … }, { file = …, of = \"bed\" } or \
-                              { low = …, high = …, period = … }";
+        let others = "{ time = […], value = […] }, { file = … }, { file = …, of = \"bed\" } or { low = …, \
+            high = …, period = … }";
         format!("{}, e.g. \"{}\", {others}", D::NAME, D::EXAMPLE)
     }
 
@@ -155,8 +158,8 @@ impl<D: Dimension> schemars::JsonSchema for ScheduleSpec<D> {
         let constant = generator.subschema_for::<Quantity<D>>();
         let time = generator.subschema_for::<Time>();
         schemars::json_schema!({
-             "description": "constant, or values over time: a table (linear between its times, constant outside), \
-                                        a file, or a sine",
+             "description": "constant, or values over time: a table (linear between its times, constant \
+                 outside), a file, or a sine",
             "anyOf": [constant, {
                 "type": "object",
                 "properties": {
@@ -164,22 +167,26 @@ impl<D: Dimension> schemars::JsonSchema for ScheduleSpec<D> {
                     "value": { "type": "array", "items": constant, "description": "Value at each time." },
                     "file": {
                         "type": "string",
-                        "description": "CSV file with the columns `time [unit]` and `value [unit]`, instead of `time` and `value`.",
+                        "description": "CSV file with the columns `time [unit]` and `value [unit]`, instead \
+                            of `time` and `value`.",
                     },
                      "low": {
                                             "anyOf": [constant],
-                                            "description": "Lowest value of a sine that passes its mean upwards at t = 0.",
+                                            "description": "Lowest value of a sine that passes its mean \
+                                                upwards at t = 0.",
                                         },
                     "high": { "anyOf": [constant], "description": "Highest value of the sine." },
                     "period": { "anyOf": [time], "description": "Period of the sine." },
                     "of": {
                         "type": "string",
                         "enum": ["nozzle", "bed", "fan"],
-                         "description": "Setting of a G-code `file`: temperature of nozzle or bed, or fan from `low` (off) to `high`.",
+                         "description": "Setting of a G-code `file`: temperature of nozzle or bed, or fan \
+                             from `low` (off) to `high`.",
                     },
                     "cools_to": {
                         "anyOf": [constant],
-                         "description": "Temperature towards which a bed cools when switched off or set lower; default 25 °C.",
+                         "description": "Temperature towards which a bed cools when switched off or set \
+                             lower; default 25 °C.",
                     },
                     "cooling_time": {
                         "anyOf": [time],

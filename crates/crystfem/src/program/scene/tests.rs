@@ -67,7 +67,8 @@ fn bad_points() {
     let kinetics = "kinetics = \"table-4.1-column-1\"";
     let given = |rest: &str| {
         format!(
-            "kinetics = {{ growth_rate = \"1 1/s\", nucleation = \"1e5 K^2\", avrami_exponent = 2.5, {rest} }}"
+            "kinetics = {{ growth_rate = \"1 1/s\", nucleation = \"1e5 K^2\", avrami_exponent = 2.5, {rest} \
+             }}"
         )
     };
     let cases: &[(&str, String, &[&str])] = &[

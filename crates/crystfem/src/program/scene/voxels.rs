@@ -175,8 +175,8 @@ impl StlSpec {
         let found = format!("{unit} m per unit of the file, which gives a part of {}", box_of([low, high]));
         let [x, y, z] = size.map(|x| rounded(x / unit));
         let allowed = format!(
-            "a `unit` that makes the largest side {} mm to {most} m, and the part larger than a cell \
-                         (the file contains {x} × {y} × {z}; write e.g. \"1 m\" if these are metres)",
+            "a `unit` that makes the largest side {} mm to {most} m, and the part larger than a cell (the \
+             file contains {x} × {y} × {z}; write e.g. \"1 m\" if these are metres)",
             1e3 * least
         );
         Err(source.error("mesh.stl.unit", found, allowed))

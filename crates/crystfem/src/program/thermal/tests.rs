@@ -103,9 +103,8 @@ fn shapes_of_fewer_dimensions_and_parts() {
     };
     let vtu = |time, own: &[[i32; 2]], nodes: &str, ends: &str, kinds: &str| {
         format!(
-            "<VTKFile type=\"UnstructuredGrid\"><UnstructuredGrid><Piece NumberOfPoints=\"{}\"><Points>{}</Points>\
-                         <Cells>{}{}{}</Cells>\
-             <PointData>{}</PointData></Piece></UnstructuredGrid></VTKFile>",
+            "<VTKFile type=\"UnstructuredGrid\"><UnstructuredGrid><Piece \
+             NumberOfPoints=\"{}\"><Points>{}</Points><Cells>{}{}{}</Cells><PointData>{}</PointData></Piece></UnstructuredGrid></VTKFile>",
             own.len(),
             array("Points", "Float64", &places(own)).replace(" Name", " NumberOfComponents=\"3\" Name"),
             array("connectivity", "Int32", nodes),
@@ -118,8 +117,8 @@ fn shapes_of_fewer_dimensions_and_parts() {
     let part = |time, k: usize| {
         vtu(time, &[points[k], points[k + 1], points[k + 3], points[k + 4]], "0 1 3 2", "4", "9")
     };
-    let empty = "<VTKFile type=\"UnstructuredGrid\"><UnstructuredGrid><Piece NumberOfPoints=\"0\"></Piece>\
-                     </UnstructuredGrid></VTKFile>";
+    let empty = "<VTKFile type=\"UnstructuredGrid\"><UnstructuredGrid><Piece \
+        NumberOfPoints=\"0\"></Piece></UnstructuredGrid></VTKFile>";
     write("empty.vtu", empty.into());
     write("whole.vtu", whole(0));
     for time in [0, 1] {
@@ -164,10 +163,10 @@ fn shapes_of_fewer_dimensions_and_parts() {
     };
     let flat: String = points.iter().map(|[x, y]| format!("{x} {y} ")).collect();
     let geometry = format!("<Geometry GeometryType=\"XY\">{}</Geometry>", item("6 2", &flat));
-    let quads = "<Topology TopologyType=\"Quadrilateral\" NumberOfElements=\"2\">\
-                     <DataItem Dimensions=\"2 4\" Format=\"XML\">0 1 4 3 1 2 5 4</DataItem></Topology>";
-    let mixed = "<Topology Type=\"Mixed\"><DataItem Dimensions=\"13\" Format=\"XML\">\
-                     5 0 1 4 3 4 1 2 5 4 1 5 4</DataItem></Topology>";
+    let quads = "<Topology TopologyType=\"Quadrilateral\" NumberOfElements=\"2\"><DataItem Dimensions=\"2 \
+        4\" Format=\"XML\">0 1 4 3 1 2 5 4</DataItem></Topology>";
+    let mixed = "<Topology Type=\"Mixed\"><DataItem Dimensions=\"13\" Format=\"XML\">5 0 1 4 3 4 1 2 5 4 1 \
+        5 4</DataItem></Topology>";
     let xdmf = |text: String| {
         format!(
             "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\" xmlns:xi=\"http://www.w3.org/2001/XInclude\">\
@@ -207,8 +206,8 @@ fn shapes_of_fewer_dimensions_and_parts() {
     let hdf =
         |name: &str| format!("<DataItem Dimensions=\"0\" Format=\"HDF\">\n numbers.h5:/{name}\n</DataItem>");
     let h5 = format!(
-        "<Geometry GeometryType=\"XYZ\">{}</Geometry><Topology TopologyType=\"Quadrilateral\">{}</Topology>\
-                 <Attribute Name=\"T\">{}</Attribute>",
+        "<Geometry GeometryType=\"XYZ\">{}</Geometry><Topology \
+         TopologyType=\"Quadrilateral\">{}</Topology><Attribute Name=\"T\">{}</Attribute>",
         hdf("xyz"),
         hdf("cells"),
         hdf("T0")
@@ -216,8 +215,8 @@ fn shapes_of_fewer_dimensions_and_parts() {
     write("hdf.xdmf", xdmf(grid(&h5)));
     let bytes: Vec<u8> = points.iter().flat_map(|[x, y]| f64::from(300 + 10 * x + y).to_be_bytes()).collect();
     std::fs::write(at("numbers.bin"), [vec![0; 3], bytes].concat()).unwrap();
-    let binary = "<Attribute Name=\"T\"><DataItem Dimensions=\"6\" NumberType=\"Float\" Precision=\"8\" Endian=\"Big\" \
-                      Seek=\"3\" Format=\"Binary\">numbers.bin</DataItem></Attribute>";
+    let binary = "<Attribute Name=\"T\"><DataItem Dimensions=\"6\" NumberType=\"Float\" Precision=\"8\" \
+        Endian=\"Big\" Seek=\"3\" Format=\"Binary\">numbers.bin</DataItem></Attribute>";
     write("binary.xdmf", xdmf(grid(&format!("{mesh}{binary}"))));
 
     // truncated anywhere, or with any byte changed: an error or other numbers

@@ -191,7 +191,8 @@ impl WriteArguments {
         let atoms = 148 * protocol.cells.iter().product::<usize>();
         let atom_steps = runs.len() as f64 * protocol.steps as f64 * atoms as f64;
         harness::say!(
-            "{} runs of {} steps with {atoms} atoms: {atom_steps:.2e} atom-steps, {:.0} core-hours at 15,000 per second",
+            "{} runs of {} steps with {atoms} atoms: {atom_steps:.2e} atom-steps, {:.0} core-hours at \
+             15,000 per second",
             runs.len(),
             protocol.steps,
             atom_steps / 15e3 / 3600.0

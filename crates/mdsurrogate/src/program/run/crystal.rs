@@ -33,7 +33,7 @@ pub fn measure(spec: &CrystalSpec, output: &Path, report: &mut Report) -> Result
     let bonds = cell.bonds();
     value(q::BONDS.into(), bonds.len() as f64);
     value(q::CHAINS.into(), cell.molecules() as f64);
-    let neighbours = cell.bonds_neighbourss();
+    let neighbours = cell.bonds_of_atoms();
     for element in ChemicalElement::ALL {
         for count in 1..=4 {
             let matches = |(atom, own): &(&(ChemicalElement, [f64; 3]), &Vec<_>)| {

@@ -30,7 +30,7 @@ pub fn load(
     let mut options = ReadOptions {
         columns: data.columns,
         origin: data.reference,
-        measure: data.stress,
+        pressure: data.stress,
         units: data.units,
         names: data.names.clone(),
         blocks: data.blocks.clone(),
@@ -131,7 +131,8 @@ impl Prepared {
             let isotropic = matches!(model.law(), Kind::Energy { symmetry: Symmetry::Isotropic, .. });
             if self.set.is_nominal() && !isotropic {
                 let key = if model.symmetry.is_some() { "symmetry" } else { "kind" };
-                let allowed = "`kind = \"energy\"` with `symmetry = \"isotropic\"`, for nominal stresses of an incompressible body";
+                let allowed = "`kind = \"energy\"` with `symmetry = \"isotropic\"`, for nominal stresses of \
+                    an incompressible body";
                 return Err(source.error(&at(key), "another law", allowed).into());
             }
             for name in &model.runs {

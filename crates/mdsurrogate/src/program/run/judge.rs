@@ -146,8 +146,8 @@ pub fn judge_laws(
         let far = floor.is_some_and(|floor| found.mean_square() > FAR_ABOVE_NOISE * floor);
         if far && found.mean_square() > FAR_FROM_STRESS * stress_square {
             warnings.push(format!(
-                 "{name}: the error on the test rows is {} times the noise and {} of the stress; the model has not learnt \
-                                 the data",
+                "{name}: the error on the test rows is {} times the noise and {} of the stress; the model \
+                  has not learnt the data",
                 short(found.mean_square() / floor.unwrap_or(f64::NAN)),
                 short((found.mean_square() / stress_square).sqrt())
             ));
@@ -301,8 +301,8 @@ fn record_ellipticity(report: &mut Report, name: &str, found: Option<Ellipticity
         |values: &[f64]| values.iter().map(|value| format!("{value:.4}")).collect::<Vec<_>>().join(", ");
     (lost > 0).then(|| {
         format!(
-             "{name}: loses ellipticity at {lost} of {states} training strains; the worst has C = ({}) and waves along \
-                         N = ({}): {} MPa. Finite elements localise there; `polyconvex` excludes it",
+            "{name}: loses ellipticity at {lost} of {states} training strains; the worst has C = ({}) and \
+              waves along N = ({}): {} MPa. Finite elements localise there; `polyconvex` excludes it",
             numbers(at.as_slice()),
             numbers(&direction),
             short(least / 1e6)

@@ -131,7 +131,7 @@ pub fn explain(source: &Source) -> Result<Vec<String>, Failure<Error>> {
         None => lines.push("leaves out held-out runs".into()),
     }
     for model in &scene.model {
-        let settings = model.training.over(&scene.training, false);
+        let settings = model.training.combine(&scene.training, false);
         lines.push(format!(
             "trains     {}: {} with {} parameters, {} epochs of {} steps",
             model.title(),

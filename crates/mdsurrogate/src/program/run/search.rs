@@ -51,7 +51,7 @@ pub fn search(
     let mut trainer = Trainer {
         rows: data.rows(&data.split.train),
         validation: data.rows(&data.split.validation),
-        settings: scene.training.over(&Default::default(), quick),
+        settings: scene.training.combine(&Default::default(), quick),
         done,
         states,
         seconds,
@@ -211,7 +211,8 @@ fn write(
     atomic_write(output.join("search.csv"), |file| {
         writeln!(
             file,
-            "rank,method,number,hidden layers,learning rate,parameters,epochs,validation loss (3.12) [MPa²],chosen"
+            "rank,method,number,hidden layers,learning rate,parameters,epochs,validation loss (3.12) \
+             [MPa²],chosen"
         )?;
         for (rank, trial) in ranking.iter().enumerate() {
             writeln!(

@@ -78,7 +78,7 @@ pub fn train(
             &rows,
             model.standardised(),
         )?;
-        let settings = model.training.over(&scene.training, quick);
+        let settings = model.training.combine(&scene.training, quick);
         header.provenance.clone_from(&data.set.provenance);
         header.provenance.push(format!(
             "{} {}: {} training rows of a split by {:?} with seed {}; {settings:?}",
@@ -236,8 +236,9 @@ fn early_stops(model: &Trained) -> Vec<String> {
             if members > 1 { format!(" (member {} of {members})", member + 1) } else { String::new() };
         state.is_best_early().then(|| {
             format!(
-                 "{}{which}: the best epoch is {best} of {epochs}; the validation loss only grew afterwards. Check the \
-                                 learning curve; a smaller learning rate, or validation rows more like the training rows, may help",
+                "{}{which}: the best epoch is {best} of {epochs}; the validation loss only grew \
+                  afterwards. Check the learning curve; a smaller learning rate, or validation rows more \
+                  like the training rows, may help",
                 model.name
             )
         })

@@ -66,7 +66,7 @@ fn observed(
     let chosen =
         |model: &&ModelSpec| trial.models.as_ref().is_none_or(|names| names.contains(&model.title()));
     for model in scene.model.iter().filter(chosen) {
-        let settings = model.training.over(&scene.training, quick);
+        let settings = model.training.combine(&scene.training, quick);
         let (rows, validation) = (data.rows(&data.split.train), data.rows(&data.split.validation));
         let (kind, shape) = (model.law(), model.architecture());
         let header = crate::fitted::header(kind, shape, model.members, &rows, model.standardised())?;

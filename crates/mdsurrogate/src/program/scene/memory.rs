@@ -30,7 +30,7 @@ impl Scene {
     pub fn memory(&self, rows: usize) -> f64 {
         let counts = || self.model.iter().map(|model| parameters(model) as f64);
         let batch = |model: &ModelSpec| {
-            let batch = model.training.over(&self.training, false).batch.min(rows).max(rows.min(4096));
+            let batch = model.training.combine(&self.training, false).batch.min(rows).max(rows.min(4096));
             batch as f64 * model.architecture().widths.iter().sum::<usize>() as f64
         };
         let mut bytes = ALWAYS + ROW * rows as f64;

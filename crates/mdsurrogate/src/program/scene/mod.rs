@@ -1,7 +1,7 @@
 //! TOML scenes of `mdsurrogate`: data, and models trained on them.
 
 use crate::dataset::{
-    BoxReference, Fractions, LammpsUnits, PROPERTIES, SampledColumns, SplitMethod, StressMeasure,
+    BoxReference, Fractions, LammpsUnits, PROPERTIES, PressureConvention, SampledColumns, SplitMethod,
 };
 use crate::program::quantities;
 use harness::report::Expect;
@@ -123,7 +123,7 @@ pub struct DatasetSpec {
     /// Unit of stress columns without a unit in their heading; default 1 MPa.
     pub stress_unit: Option<Stress>,
     /// Stress measure of columns `pxx …`: `pressure` as in LAMMPS, σ = −p.
-    pub stress: Option<StressMeasure>,
+    pub stress: Option<PressureConvention>,
     /// Units of LAMMPS output: `real`, `metal`, `si`, `cgs`, `electron`, `micro`, `nano`; default: those in
     /// the log.
     pub units: Option<LammpsUnits>,
