@@ -8,15 +8,15 @@ pub use body::Body;
 pub use rubber::Rubber;
 
 use crate::bonds::{BodyGeometry, LatticeBonds, Property, covered_stretches, fragments};
-use crate::contact::{Contact, Plane};
+use crate::contact::{Contact, RigidPlane};
 use crate::error::Error;
 use crate::material::{BondMaterial, Material, NonlocalSolid, PointLaw};
 use crate::potential::KernelFit;
 use crate::probe::StressEvaluator;
 use crate::solver::{
-    Breaking, Loads, Method, Policy, Record, Rotation, State, Status, Support, System, Turned,
+    Breaking, Loads, Method, Policy, StepRecord, Rotation, State, Status, Support, System, Turned,
 };
-use crate::stress::{self, BallVolume, Loaded, Measure, Missing, Tensor};
+use crate::stress::{self, BallVolume, Loaded, Missing, StressMeasure, StressTensor};
 use std::sync::Arc;
 
 /// A material of a body: a [`Material`], or a description that becomes one in a body, such as [`Rubber`].
@@ -44,7 +44,7 @@ impl<const D: usize, M: Material<D> + Clone> IntoMaterial<D> for M {
 }
 
 /// Selects the points X, m, that belong to a region.
-type Region<const D: usize> = Box<dyn Fn(&[[f64; D]]) -> Result<Vec<bool>, Error>>;
+type RegionTest<const D: usize> = Box<dyn Fn(&[[f64; D]]) -> Result<Vec<bool>, Error>>;
 
 /// A body, its material and its loads, before anything is built.
 ///
@@ -53,13 +53,13 @@ type Region<const D: usize> = Box<dyn Fn(&[[f64; D]]) -> Result<Vec<bool>, Error
 pub struct Model<const D: usize, M> {
     body: Body<D>,
     material: M,
-    regions: Vec<(Region<D>, Support<D>)>,
+    regions: Vec<(RegionTest<D>, Support<D>)>,
     /// Rotating regions, by their numbers.
     rotations: Vec<(usize, Rotation<D>)>,
     factors: Vec<f64>,
     critical_stretch: Option<Property>,
     contact: Option<f64>,
-    planes: Vec<Plane<D>>,
+    planes: Vec<RigidPlane<D>>,
 }
 
 impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
@@ -128,8 +128,8 @@ impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
     }
 
     /// Adds a rigid plane that the body cannot pass, or to which it is tied. Explicit dynamics takes larger
-    /// steps with a [`Plane::stiffness`] of 2.
-    pub fn plane(mut self, plane: Plane<D>) -> Self {
+    /// steps with a [`RigidPlane::stiffness`] of 2.
+    pub fn plane(mut self, plane: RigidPlane<D>) -> Self {
         self.planes.push(plane);
         self
     }
@@ -248,7 +248,7 @@ impl<const D: usize, M: Material<D> + Clone> Simulation<D, M> {
     }
 
     /// Finished load steps, or the rows of a dynamic history.
-    pub fn history(&self) -> &[Record] {
+    pub fn history(&self) -> &[StepRecord] {
         &self.state.history
     }
 
@@ -284,7 +284,7 @@ impl<const D: usize> Simulation<D, BondMaterial<'_>> {
     ///
     /// # Errors
     /// As [`KernelFit::new`].
-    pub fn piola(&self, measure: Measure) -> Result<Vec<Tensor<D>>, Error> {
+    pub fn piola(&self, measure: StressMeasure) -> Result<Vec<StressTensor<D>>, Error> {
         let displacement = &self.state.displacement;
         let fit = KernelFit::new(self.material.law(), covered_stretches(&self.bonds, displacement), 1e-9)?;
         let (modulus, missing) = (self.material.modulus(), Missing::WindowAt(&self.loaded));
@@ -296,7 +296,7 @@ impl<const D: usize> Simulation<D, BondMaterial<'_>> {
     ///
     /// # Errors
     /// As [`Self::piola`].
-    pub fn cauchy(&self, measure: Measure) -> Result<Vec<Tensor<D>>, Error> {
+    pub fn cauchy(&self, measure: StressMeasure) -> Result<Vec<StressTensor<D>>, Error> {
         let gradients = stress::deformation_gradients(&self.bonds, &self.state.displacement);
         Ok(stress::cauchy(&self.piola(measure)?, &gradients))
     }

@@ -3,8 +3,8 @@
 //! A particle occupies one or two rows of four numbers. Groups of as many rows as a vector has lanes are
 //! loaded whole and transposed by shuffles: with AVX2 and AVX-512 this takes 0.7 of the time of scalar loads.
 
-use super::kernel::{Pass, law};
-use super::real::Real;
+use super::kernel::{ForceKernel, law};
+use super::real::KernelReal;
 use crate::field::{CHUNK, Field};
 use crate::potential::StretchRange;
 use pulp::Simd;
@@ -20,13 +20,13 @@ const ROW: usize = 4;
 /// Positions and displacements of consecutive particles: (x, y, u_x, u_y) in a plane, in space (x, y, z, 0)
 /// and (u_x, u_y, u_z, 0).
 #[derive(Default)]
-pub struct Rows {
+pub struct ParticleRows {
     /// The first particle.
     first: usize,
     rows: Vec<[f64; ROW]>,
 }
 
-impl Rows {
+impl ParticleRows {
     /// Gathers these particles in a displacement.
     pub fn new<const D: usize>(position: &Field<D>, displacement: &Field<D>, range: Range<usize>) -> Self {
         let mut rows = Self { first: range.start, rows: vec![[0.0; ROW]; range.len() * (D - 1)] };
@@ -81,7 +81,7 @@ impl Rows {
 /// Input of the cloud kernel: compressed rows of neighbours.
 pub struct CloudData<'a, const D: usize> {
     /// All particles that a work item reads.
-    pub rows: &'a Rows,
+    pub rows: &'a ParticleRows,
     /// First bond of each particle, and the end of the last.
     pub starts: &'a [usize],
     /// Neighbour of each bond.
@@ -104,7 +104,7 @@ pub struct CloudPass<'a, const D: usize, const P: usize, const Q: usize> {
     pub clamp: [f64; 2],
 }
 
-impl<const D: usize, const P: usize, const Q: usize> Pass<D> for CloudPass<'_, D, P, Q> {
+impl<const D: usize, const P: usize, const Q: usize> ForceKernel<D> for CloudPass<'_, D, P, Q> {
     #[inline(always)]
     fn run<S: Simd>(
         &self,
@@ -191,7 +191,7 @@ impl<const D: usize, const P: usize, const Q: usize> Pass<D> for CloudPass<'_, D
 #[inline(always)]
 unsafe fn columns<S: Simd, const D: usize>(
     simd: S,
-    rows: &Rows,
+    rows: &ParticleRows,
     at: usize,
     group: &[u32],
     order: &[usize; GROUP],

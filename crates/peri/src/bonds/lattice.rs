@@ -4,13 +4,13 @@
 mod connect;
 mod mixed;
 
-use super::lattice_kernel::{Class, Factors, TILE, Tiles};
+use super::lattice_kernel::{Factors, TILE, TileClass, Tiles};
 use super::lattice_sums::{GradientSums, Span, Spans, Weights};
 use super::rows::{LatticeKernel, StencilBond, lattice_kernel};
-use super::softening::{Softened, Softening, integrity};
+use super::softening::{Softened, SoftenedBonds, integrity};
 use super::stencil::{Stencil, fullest, layout, storage};
 use super::{
-    BodyGeometry, BondDamage, BondForces, Bonds, Kind, Neighbour, Overstretched, VolumeCorrection,
+    BodyGeometry, BondDamage, BondForces, BondKind, Bonds, Neighbour, Overstretched, VolumeCorrection,
     plain_force, refuse_one_sided, surface_weight,
 };
 use crate::error::Error;
@@ -36,7 +36,7 @@ pub struct LatticeBonds<const D: usize> {
     sites: usize,
     particles: Vec<u32>,
     intact: Vec<Vec<u64>>,
-    classes: Vec<Class>,
+    classes: Vec<TileClass>,
     factors: Option<Field<D>>,
     /// True if the factors are equal along all axes.
     even: bool,
@@ -47,7 +47,7 @@ pub struct LatticeBonds<const D: usize> {
     /// A law that only a table represents, and kθ.
     table: Option<(KernelFit, f64)>,
     directed_bonds: u64,
-    softening: Softening,
+    softening: SoftenedBonds,
     mixed: Option<Mixed<D>>,
 }
 
@@ -114,14 +114,14 @@ impl<const D: usize> LatticeBonds<D> {
             sites,
             particles: Vec::new(),
             intact: Vec::new(),
-            classes: vec![Class::Empty; sites / TILE],
+            classes: vec![TileClass::Empty; sites / TILE],
             factors: None,
             even: true,
             interior_factor: 1.0,
             kernel: None,
             table: None,
             directed_bonds: 0,
-            softening: Softening::default(),
+            softening: SoftenedBonds::default(),
             mixed: None,
             lattice,
         };
@@ -452,11 +452,11 @@ impl<const D: usize> BondDamage<D> for LatticeBonds<D> {
         tiles.dedup();
         for tile in tiles {
             let empty = (tile * TILE..(tile + 1) * TILE).all(|s| self.intact.iter().all(|w| w[s] == 0));
-            self.classes[tile] = if empty { Class::Empty } else { Class::Partial };
+            self.classes[tile] = if empty { TileClass::Empty } else { TileClass::Partial };
         }
     }
 
-    fn softening(&self) -> &Softening {
+    fn softening(&self) -> &SoftenedBonds {
         &self.softening
     }
 
@@ -496,7 +496,7 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
         self.sites * 8 * self.intact.len() + self.classes.len() + self.particles.len() * 4 + factors + mixed
     }
 
-    fn kind(&self) -> Kind<'_, D> {
-        Kind::Lattice(self)
+    fn kind(&self) -> BondKind<'_, D> {
+        BondKind::Lattice(self)
     }
 }

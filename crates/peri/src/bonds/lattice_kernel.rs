@@ -1,7 +1,7 @@
 //! The lattice kernel: vectors of neighbouring particles, one bond of the stencil at a time, without gather.
 
-use super::kernel::{Pass, law};
-use super::real::Real;
+use super::kernel::{ForceKernel, law};
+use super::real::KernelReal;
 use crate::potential::StretchRange;
 use pulp::Simd;
 
@@ -11,7 +11,7 @@ pub const TILE: usize = 16;
 /// A bond of the stencil with the law's coefficients scaled to its length and stiffness, for `P` numerator
 /// and `Q` denominator coefficients: q·c = E·ΣₖaₖEᵏ/(1 + ΣₖbₖEᵏ⁺¹), E = η·(2ξ + η).
 #[derive(Clone, Copy, Debug)]
-pub struct Row<T, const D: usize, const P: usize, const Q: usize> {
+pub struct StencilRow<T, const D: usize, const P: usize, const Q: usize> {
     /// Distance to the neighbour in sites.
     pub shift: isize,
     /// Reference bond ξ.
@@ -31,7 +31,7 @@ pub struct Row<T, const D: usize, const P: usize, const Q: usize> {
 /// Work that the particles of a tile need.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
-pub enum Class {
+pub enum TileClass {
     /// No particle has a bond.
     Empty,
     /// Every particle has every bond, with the stencil's own weight.
@@ -47,7 +47,7 @@ pub struct Tiles<'a, const D: usize, T = f64> {
     /// Bit k of word w at a site: bond 64w + k is intact.
     pub intact: &'a [Vec<u64>],
     /// Class of each tile.
-    pub classes: &'a [Class],
+    pub classes: &'a [TileClass],
     /// Per-particle correction factors g (see [`super::correction`]), if the scene asks for them.
     pub factors: Option<Factors<'a, D, T>>,
     /// Largest |shift|: sites closer than this to either end hold no particle.
@@ -80,14 +80,16 @@ impl<'a, const D: usize, T> Factors<'a, D, T> {
 /// The lattice kernel: tiles and rows.
 pub struct LatticePass<'a, T, const D: usize, const P: usize, const Q: usize> {
     /// The stencil.
-    pub rows: &'a [Row<T, D, P, Q>],
+    pub rows: &'a [StencilRow<T, D, P, Q>],
     /// The storage, in units of the rows.
     pub tiles: &'a Tiles<'a, D, T>,
     /// Unit of the rows' forces.
     pub unit: f64,
 }
 
-impl<T: Real, const D: usize, const P: usize, const Q: usize> Pass<D> for LatticePass<'_, T, D, P, Q> {
+impl<T: KernelReal, const D: usize, const P: usize, const Q: usize> ForceKernel<D>
+    for LatticePass<'_, T, D, P, Q>
+{
     /// `start` and the length are multiples of [`TILE`].
     #[inline(always)]
     fn run<S: Simd>(
@@ -118,7 +120,7 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> Pass<D> for Lattic
             for f in force.iter_mut() {
                 f[offset..offset + TILE].fill(0.0);
             }
-            if class == Class::Empty {
+            if class == TileClass::Empty {
                 continue;
             }
             assert!(base >= self.tiles.guard && base + TILE + self.tiles.guard <= sites);
@@ -136,7 +138,7 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> Pass<D> for Lattic
                 };
                 // SAFETY: see above; `out` has at least `step` elements left in its tile.
                 unsafe {
-                    match (class == Class::Full, pair) {
+                    match (class == TileClass::Full, pair) {
                         (true, true) => self.full::<S, 2>(simd, base + sub, out, tracking, &mut seen),
                         (true, false) => self.full::<S, 1>(simd, base + sub, out, tracking, &mut seen),
                         // at the end of a row: one vector
@@ -161,7 +163,7 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> Pass<D> for Lattic
     }
 }
 
-impl<T: Real, const D: usize, const P: usize, const Q: usize> LatticePass<'_, T, D, P, Q> {
+impl<T: KernelReal, const D: usize, const P: usize, const Q: usize> LatticePass<'_, T, D, P, Q> {
     /// Returns the number of rows whose stretches are tracked: rows of one direction visit every bond once.
     #[inline(always)]
     fn tracked(&self, tracking: bool) -> usize {
@@ -375,7 +377,7 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> LatticePass<'_, T,
     }
 }
 
-impl<T: Real, const D: usize, const P: usize, const Q: usize> Row<T, D, P, Q> {
+impl<T: KernelReal, const D: usize, const P: usize, const Q: usize> StencilRow<T, D, P, Q> {
     /// Computes ζ of a bond of the particles from `here` on, and E = η·(2ξ + η) = |ζ|² − |ξ|².
     ///
     /// # Safety

@@ -25,16 +25,16 @@ pub use breaking::{Fragment, Overstretched, StretchScan, components, fingerprint
 pub use cells::CellGrid;
 pub use cloud::CloudBonds;
 pub use cloud_kernel::GROUP;
-pub use cloud_linear::{CloudMoments, CloudPlaces, Columns};
+pub use cloud_linear::{CloudMoments, CloudPlaces, MomentColumns};
 pub use lattice::LatticeBonds;
 pub use lattice_kernel::TILE;
 pub use lattice_sums::GradientSums;
 pub(crate) use lattice_sums::Weights;
 pub use linear_kernel::{LinearRow, Moments};
 pub use property::Property;
-pub use softening::{Softened, Softening, among};
+pub use softening::{Softened, SoftenedBonds, among};
 pub use stencil::{Stencil, storage};
-pub use traits::{BodyGeometry, BondDamage, BondForces, Bonds, Kind, Neighbour};
+pub use traits::{BodyGeometry, BondDamage, BondForces, BondKind, Bonds, Neighbour};
 
 #[cfg(feature = "gpu")]
 pub(crate) use rows::{StencilBond, scaled_laws};

@@ -1,7 +1,7 @@
 //! Friction of all contacts: between equilibria and in explicit dynamics.
 
 use super::Contact;
-use super::grip::{Grip, Pair};
+use super::grip::{ContactPair, Grip};
 use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field, chunk_range};
 use rayon::prelude::*;
@@ -44,7 +44,7 @@ impl<const D: usize> Contact<D> {
             for (own, touching) in self.pairs(bonds, displacement, sites, 0.0).filter(|_| self.friction > 0.0)
             {
                 for touch in touching {
-                    let pair = Pair::Particles(own.site, touch.site);
+                    let pair = ContactPair::Particles(own.site, touch.site);
                     let known = old.binary_search_by_key(&pair, |grip| grip.pair).ok().map(|at| &old[at]);
                     let volumes = [own.site, touch.site].map(|site| bonds.volume(site as usize));
                     let push = self.pair(own.site, touch.site) * volumes[0] * volumes[1];
@@ -82,8 +82,8 @@ impl<const D: usize> Contact<D> {
             grip.slip = drag.slip;
             match grip.pair {
                 // the other half is counted from the other side
-                Pair::Particles(..) => dissipated += 0.5 * drag.dissipated,
-                Pair::Face(plane, _) | Pair::Particle(plane, _) => {
+                ContactPair::Particles(..) => dissipated += 0.5 * drag.dissipated,
+                ContactPair::Face(plane, _) | ContactPair::Particle(plane, _) => {
                     dissipated += drag.dissipated;
                     (0..3).for_each(|d| forces[plane as usize][d] += drag.force[d]);
                 }
@@ -93,9 +93,9 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Motion of the first side of a pair against the second since friction began to act, m.
-    fn slipped(&self, pair: Pair, displacement: &Field<D>) -> [f64; 3] {
+    fn slipped(&self, pair: ContactPair, displacement: &Field<D>) -> [f64; 3] {
         let Some(start) = &self.start else { return [0.0; 3] };
-        let Pair::Particles(own, other) = pair else {
+        let ContactPair::Particles(own, other) = pair else {
             return self.planes.as_ref().map_or([0.0; 3], |planes| planes.slipped(pair, displacement, start));
         };
         let since = |site: u32, d: usize| {
@@ -108,7 +108,7 @@ impl<const D: usize> Contact<D> {
     pub(super) fn slip_energy(&self, displacement: &Field<D>) -> f64 {
         let of = |grip: &Grip| {
             let slip = grip.drag(self.slipped(grip.pair, displacement)).slip;
-            let part = if matches!(grip.pair, Pair::Particles(..)) { 0.5 } else { 1.0 };
+            let part = if matches!(grip.pair, ContactPair::Particles(..)) { 0.5 } else { 1.0 };
             part * Grip { slip, ..*grip }.energy()
         };
         self.held.iter().map(of).sum()
@@ -122,7 +122,7 @@ impl<const D: usize> Contact<D> {
         }
         let end = start + force[0].len();
         for grip in self.held_by(start..end) {
-            let Pair::Particles(own, _) = grip.pair else { continue };
+            let ContactPair::Particles(own, _) = grip.pair else { continue };
             let drag = grip.drag(self.slipped(grip.pair, displacement)).force;
             let volume = self.list.volume(own as usize);
             (0..D).for_each(|d| force[d][own as usize - start] += drag[d] / volume);
@@ -132,8 +132,9 @@ impl<const D: usize> Contact<D> {
     /// Returns the active friction between particles of a range of sites.
     fn held_by(&self, sites: Range<usize>) -> &[Grip] {
         let before = |end: usize| {
-            self.held
-                .partition_point(|grip| matches!(grip.pair, Pair::Particles(own, _) if (own as usize) < end))
+            self.held.partition_point(
+                |grip| matches!(grip.pair, ContactPair::Particles(own, _) if (own as usize) < end),
+            )
         };
         &self.held[before(sites.start)..before(sites.end)]
     }
@@ -154,7 +155,7 @@ impl<const D: usize> Contact<D> {
         for grip in &mut grips {
             grip.share = 1.0;
             let moved = match (grip.pair, &self.planes) {
-                (Pair::Particles(own, other), _) => {
+                (ContactPair::Particles(own, other), _) => {
                     let (own, other) = (at(own), at(other));
                     std::array::from_fn(|d| if d < D { step * (own[d] - other[d]) } else { 0.0 })
                 }
@@ -163,9 +164,9 @@ impl<const D: usize> Contact<D> {
             };
             let drag = grip.drag(moved);
             grip.slip = drag.slip;
-            let part = if matches!(grip.pair, Pair::Particles(..)) { 0.5 } else { 1.0 };
+            let part = if matches!(grip.pair, ContactPair::Particles(..)) { 0.5 } else { 1.0 };
             sliding.stored += part * grip.energy();
-            if let Pair::Face(plane, _) | Pair::Particle(plane, _) = grip.pair {
+            if let ContactPair::Face(plane, _) | ContactPair::Particle(plane, _) = grip.pair {
                 (0..3).for_each(|d| sliding.planes[plane as usize][d] += drag.force[d]);
             }
         }
@@ -192,7 +193,7 @@ impl<const D: usize> Contact<D> {
     pub fn add_friction(&self, chunk: usize, force: &mut [&mut [f64]; D]) {
         let start = chunk * CHUNK;
         for grip in self.held_by(start..start + force[0].len()) {
-            let Pair::Particles(own, _) = grip.pair else { continue };
+            let ContactPair::Particles(own, _) = grip.pair else { continue };
             let volume = self.list.volume(own as usize);
             (0..D).for_each(|d| force[d][own as usize - start] -= grip.stiffness * grip.slip[d] / volume);
         }

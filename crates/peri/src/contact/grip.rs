@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 /// Two sides in contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub enum Pair {
+pub enum ContactPair {
     /// Two particles, by their sites.
     Particles(u32, u32),
     /// A plane and a face, by their numbers.
@@ -23,7 +23,7 @@ pub enum Pair {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Grip {
     /// The sides.
-    pub pair: Pair,
+    pub pair: ContactPair,
     /// Elastic slip e, m.
     pub slip: [f64; 3],
     /// b = μN, N.

@@ -32,7 +32,7 @@ pub struct List<const D: usize> {
     vicinity: Option<Vicinity<D>>,
     /// Particles with candidates, ascending, with the end of each one's candidates.
     listed: Vec<Listed>,
-    candidates: Vec<Candidate<D>>,
+    candidates: Vec<ContactCandidate<D>>,
     /// Particles without bonds, ascending.
     pub alone: Vec<u32>,
     /// Number of rebuilds.
@@ -52,14 +52,14 @@ pub struct Listed {
 /// A particle near another, as seen from the latter. Lists are long and most pairs are apart, so it holds
 /// only what shows that.
 #[derive(Clone, Copy)]
-struct Candidate<const D: usize> {
+struct ContactCandidate<const D: usize> {
     site: u32,
     /// ξ in spacings, rounded.
     bond: [f32; D],
 }
 
 /// A particle near enough to another, as seen from the latter.
-pub struct Near<const D: usize> {
+pub struct NearbyParticle<const D: usize> {
     pub site: u32,
     /// ξ, m.
     bond: [f64; D],
@@ -70,7 +70,7 @@ pub struct Near<const D: usize> {
     pub r: f64,
 }
 
-impl<const D: usize> Near<D> {
+impl<const D: usize> NearbyParticle<D> {
     /// ζ/r; ξ/|ξ| for two particles at one point.
     pub fn direction(&self) -> [f64; D] {
         let (along, size) = if self.r > 0.0 { (self.zeta, self.r) } else { (self.bond, length(self.bond)) };
@@ -147,7 +147,7 @@ impl<const D: usize> List<D> {
             let near = self.near(own as usize, other as usize, bond, &vicinity.listed_at, reach)?;
             Some((own, self.candidate(&near)))
         };
-        let mut found: Vec<(u32, Candidate<D>)> = pairs.par_iter().filter_map(near).collect();
+        let mut found: Vec<(u32, ContactCandidate<D>)> = pairs.par_iter().filter_map(near).collect();
         found.sort_unstable_by_key(|(own, candidate)| (*own, candidate.site));
         let (listed, candidates) = (std::mem::take(&mut self.listed), std::mem::take(&mut self.candidates));
         self.candidates.reserve(candidates.len() + found.len());
@@ -165,8 +165,9 @@ impl<const D: usize> List<D> {
             found = others;
             if !new.is_empty() {
                 // a list made after the bonds broke has these pairs
-                let lacks =
-                    |new: &&(u32, Candidate<D>)| known.binary_search_by_key(&new.1.site, |c| c.site).is_err();
+                let lacks = |new: &&(u32, ContactCandidate<D>)| {
+                    known.binary_search_by_key(&new.1.site, |c| c.site).is_err()
+                };
                 self.candidates.extend(new.iter().filter(lacks).map(|new| new.1));
                 self.candidates[from..].sort_unstable_by_key(|candidate| candidate.site);
             }
@@ -233,7 +234,7 @@ impl<const D: usize> List<D> {
             }
             (listed, candidates)
         };
-        let parts: Vec<(Vec<Listed>, Vec<Candidate<D>>)> =
+        let parts: Vec<(Vec<Listed>, Vec<ContactCandidate<D>>)> =
             (0..particles.len().div_ceil(CHUNK)).into_par_iter().map(of).collect();
         self.listed.clear();
         self.candidates.clear();
@@ -265,17 +266,17 @@ impl<const D: usize> List<D> {
         bond: [f64; D],
         displacement: &Field<D>,
         gap: f64,
-    ) -> Option<Near<D>> {
+    ) -> Option<NearbyParticle<D>> {
         let radii = OF_RADII * (self.radius(own) + self.radius(other));
         let distance = (OF_REFERENCE * length(bond)).min(radii);
         let (here, there) = (displacement.get(own), displacement.get(other));
         let zeta = std::array::from_fn(|d| bond[d] + (there[d] - here[d]));
         let r = length(zeta);
-        (r < distance + gap).then_some(Near { site: other as u32, bond, distance, zeta, r })
+        (r < distance + gap).then_some(NearbyParticle { site: other as u32, bond, distance, zeta, r })
     }
 
-    fn candidate(&self, near: &Near<D>) -> Candidate<D> {
-        Candidate { site: near.site, bond: near.bond.map(|x| (x / self.spacing) as f32) }
+    fn candidate(&self, near: &NearbyParticle<D>) -> ContactCandidate<D> {
+        ContactCandidate { site: near.site, bond: near.bond.map(|x| (x / self.spacing) as f32) }
     }
 
     /// Iterates over the particles of `sites` that have others at r < d + `gap`, up to the gap of the list,
@@ -286,7 +287,7 @@ impl<const D: usize> List<D> {
         displacement: &'a Field<D>,
         sites: Range<usize>,
         gap: f64,
-    ) -> impl Iterator<Item = (Listed, impl Iterator<Item = Near<D>> + 'a)> + 'a {
+    ) -> impl Iterator<Item = (Listed, impl Iterator<Item = NearbyParticle<D>> + 'a)> + 'a {
         let at = |site: usize| self.listed.partition_point(|own| (own.site as usize) < site);
         let most = 2.0 * OF_RADII * self.largest;
         (at(sites.start)..at(sites.end)).map(move |k| {
@@ -294,7 +295,7 @@ impl<const D: usize> List<D> {
             let listed = self.listed[k];
             let own = listed.site as usize;
             let here = displacement.get(own);
-            let near = move |candidate: &Candidate<D>| {
+            let near = move |candidate: &ContactCandidate<D>| {
                 let other = candidate.site as usize;
                 let there = displacement.get(other);
                 let (mut reference, mut square) = (0.0, 0.0);

@@ -41,18 +41,18 @@ mod vicinity;
 use crate::bonds::{BodyGeometry, Bonds, LatticeBonds, Property};
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
-use crate::surface::Surface;
+use crate::surface::BodySurface;
 pub use friction::Sliding;
-pub use grip::{Drag, Grip, Pair};
-use list::{List, Listed, Near};
-pub use plane::{Plane, PlaneReaction};
+pub use grip::{ContactPair, Drag, Grip};
+use list::{List, Listed, NearbyParticle};
+pub use plane::{PlaneReaction, RigidPlane};
 use planes::Planes;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 pub use stiffness::Spring;
 use ties::Ties;
-pub use ties::{Interface, across, grips};
+pub use ties::{GripInterface, across, grips};
 
 /// κ of Macek & Silling (2007).
 pub const SHORT_RANGE: f64 = 15.0;
@@ -172,9 +172,9 @@ impl<const D: usize> Contact<D> {
     pub fn with_planes(
         mut self,
         bonds: &dyn Bonds<D>,
-        surface: &Surface<D>,
+        surface: &BodySurface<D>,
         modulus: impl Into<Property>,
-        planes: Vec<Plane<D>>,
+        planes: Vec<RigidPlane<D>>,
     ) -> Result<Self, Error> {
         if !planes.is_empty() {
             let modulus = modulus.into();
@@ -194,8 +194,8 @@ impl<const D: usize> Contact<D> {
     pub fn with_tied(
         mut self,
         bonds: &LatticeBonds<D>,
-        interface: Interface<D>,
-        outside: &Surface<D>,
+        interface: GripInterface<D>,
+        outside: &BodySurface<D>,
         modulus: f64,
         stiffness: f64,
     ) -> Result<Self, Error> {
@@ -262,7 +262,7 @@ impl<const D: usize> Contact<D> {
     }
 
     /// The planes, in their order.
-    pub fn planes(&self) -> impl Iterator<Item = &Plane<D>> {
+    pub fn planes(&self) -> impl Iterator<Item = &RigidPlane<D>> {
         self.planes.iter().flat_map(Planes::planes)
     }
 
@@ -347,7 +347,7 @@ impl<const D: usize> Contact<D> {
         displacement: &'a Field<D>,
         sites: Range<usize>,
         gap: f64,
-    ) -> impl Iterator<Item = (Listed, impl Iterator<Item = Near<D>> + 'a)> + 'a {
+    ) -> impl Iterator<Item = (Listed, impl Iterator<Item = NearbyParticle<D>> + 'a)> + 'a {
         self.has_pairs().then(|| self.list.pairs(bonds, displacement, sites, gap)).into_iter().flatten()
     }
 

@@ -1,13 +1,13 @@
 //! Contact of faces and particles with rigid planes.
 
 use super::faces::Faces;
-use super::grip::{Grip, Pair};
-use super::plane::{Plane, PlaneReaction};
+use super::grip::{ContactPair, Grip};
+use super::plane::{PlaneReaction, RigidPlane};
 use crate::bonds::{BodyGeometry, Bonds, Property};
 use crate::error::Error;
 use crate::field::Field;
 use crate::geometry::length;
-use crate::surface::Surface;
+use crate::surface::BodySurface;
 use rayon::prelude::*;
 
 /// Distance of a face from a plane up to which it is tied to it, in spacings.
@@ -16,8 +16,8 @@ const TIED: f64 = 0.5;
 const BATCH: usize = 1024;
 
 /// A plane in motion.
-pub(super) struct Placed<const D: usize> {
-    pub(super) plane: Plane<D>,
+pub(super) struct MovingPlane<const D: usize> {
+    pub(super) plane: RigidPlane<D>,
     /// Displacement of the plane now and at the last placement, m.
     pub(super) now: [f64; D],
     pub(super) before: [f64; D],
@@ -60,7 +60,7 @@ impl<const D: usize> Touch<D> {
 /// All planes of a scene with the elements they act on: faces of the body, and particles that have lost
 /// bonds.
 pub struct Planes<const D: usize> {
-    pub(super) each: Vec<Placed<D>>,
+    pub(super) each: Vec<MovingPlane<D>>,
     pub(super) faces: Faces<D>,
     /// True for faces whose particles have all their bonds.
     sound: Vec<bool>,
@@ -89,12 +89,12 @@ impl<const D: usize> Planes<D> {
     /// Places planes at rest beside a body; `modulus` is M, Pa, and `radius` that of a particle, m.
     ///
     /// # Errors
-    /// [`Error::Parameter`] as for [`Plane`]; [`Error::Geometry`] for a bonded plane that touches no face.
+    /// [`Error::Parameter`] as for [`RigidPlane`]; [`Error::Geometry`] for a bonded plane that touches no face.
     pub fn new(
         bonds: &dyn Bonds<D>,
-        surface: &Surface<D>,
+        surface: &BodySurface<D>,
         modulus: &Property,
-        planes: Vec<Plane<D>>,
+        planes: Vec<RigidPlane<D>>,
         radius: impl Fn(usize) -> f64,
     ) -> Result<Self, Error> {
         let faces = Faces::new(bonds, surface, false);
@@ -119,7 +119,7 @@ impl<const D: usize> Planes<D> {
                     number + 1
                 )));
             }
-            each.push(Placed { plane, now: [0.0; D], before: [0.0; D], tied });
+            each.push(MovingPlane { plane, now: [0.0; D], before: [0.0; D], tied });
         }
         let mut planes = Self {
             each,
@@ -144,14 +144,14 @@ impl<const D: usize> Planes<D> {
     }
 
     /// The planes.
-    pub fn planes(&self) -> impl Iterator<Item = &Plane<D>> {
+    pub fn planes(&self) -> impl Iterator<Item = &RigidPlane<D>> {
         self.each.iter().map(|placed| &placed.plane)
     }
 
     /// Moves planes to their positions at a load factor and a time, s.
     pub fn place(&mut self, factor: f64, time: f64) {
         for placed in &mut self.each {
-            let Plane { displacement, velocity, .. } = placed.plane;
+            let RigidPlane { displacement, velocity, .. } = placed.plane;
             placed.before = placed.now;
             placed.now = std::array::from_fn(|d| factor * displacement[d] + time * velocity[d]);
         }
@@ -204,8 +204,8 @@ impl<const D: usize> Planes<D> {
     }
 
     /// Computes the state of an element beside a plane, whatever its overlap.
-    pub(super) fn beside(&self, placed: &Placed<D>, field: &Field<D>, element: usize) -> Touch<D> {
-        let Plane { normal, stiffness, .. } = placed.plane;
+    pub(super) fn beside(&self, placed: &MovingPlane<D>, field: &Field<D>, element: usize) -> Touch<D> {
+        let RigidPlane { normal, stiffness, .. } = placed.plane;
         let moved = self.displacement(field, element);
         let (home, radius, area) = match element.checked_sub(self.faces.len()) {
             None => {
@@ -225,7 +225,7 @@ impl<const D: usize> Planes<D> {
     }
 
     /// Elements that a plane acts on, in order: its tied faces, or those behind it.
-    fn touches(&self, placed: &Placed<D>, field: &Field<D>) -> Vec<Touch<D>> {
+    fn touches(&self, placed: &MovingPlane<D>, field: &Field<D>) -> Vec<Touch<D>> {
         if placed.plane.bonded {
             let tied = |&face: &u32| {
                 let mut element = face as usize;
@@ -244,7 +244,7 @@ impl<const D: usize> Planes<D> {
     }
 
     /// Elements nearer to a plane than `gap`, m, in order.
-    pub(super) fn near(&self, placed: &Placed<D>, field: &Field<D>, gap: f64) -> Vec<Touch<D>> {
+    pub(super) fn near(&self, placed: &MovingPlane<D>, field: &Field<D>, gap: f64) -> Vec<Touch<D>> {
         let count = self.elements();
         let batch = |start: usize| {
             let range = start * BATCH..((start + 1) * BATCH).min(count);
@@ -282,11 +282,11 @@ impl<const D: usize> Planes<D> {
     }
 
     /// Plane and element of a pair; `None` for two particles.
-    pub(super) fn element(&self, pair: Pair) -> Option<(usize, usize)> {
+    pub(super) fn element(&self, pair: ContactPair) -> Option<(usize, usize)> {
         match pair {
-            Pair::Particles(..) => None,
-            Pair::Face(plane, face) => Some((plane as usize, face as usize)),
-            Pair::Particle(plane, site) => {
+            ContactPair::Particles(..) => None,
+            ContactPair::Face(plane, face) => Some((plane as usize, face as usize)),
+            ContactPair::Particle(plane, site) => {
                 Some((plane as usize, self.faces.len() + self.bare.binary_search(&site).ok()?))
             }
         }
@@ -345,7 +345,7 @@ impl<const D: usize> Planes<D> {
 
     /// Force, area and width of the contact with each plane, without friction.
     pub fn resting(&self, field: &Field<D>) -> Vec<PlaneReaction> {
-        let of = |placed: &Placed<D>| {
+        let of = |placed: &MovingPlane<D>| {
             let normal = placed.plane.normal;
             let mut resting = PlaneReaction { gap: f64::INFINITY, ..PlaneReaction::default() };
             let (mut push, mut first, mut second) = (0.0, [0.0; D], [0.0; D]);
@@ -402,7 +402,7 @@ impl<const D: usize> Planes<D> {
     /// Bound of the stiffness that planes add over volumes, N/m⁴, however many faces touch.
     pub fn stiffness(&self) -> f64 {
         let mut matrix = nalgebra::Matrix3::<f64>::zeros();
-        for Placed { plane, .. } in &self.each {
+        for MovingPlane { plane, .. } in &self.each {
             let isotropic = plane.bonded || plane.friction > 0.0;
             let n = |d: usize| plane.normal.get(d).copied().unwrap_or(0.0);
             matrix += nalgebra::Matrix3::from_fn(|a, b| {

@@ -1,7 +1,7 @@
 //! Stiffness of contact: for time steps, masses of relaxation, preconditioners and their step lengths.
 
 use super::Contact;
-use super::list::{Listed, Near};
+use super::list::{Listed, NearbyParticle};
 use super::planes::Planes;
 use super::ties::Ties;
 use crate::bonds::BodyGeometry;
@@ -19,8 +19,9 @@ impl<const D: usize> Contact<D> {
         let sites = displacement.sites();
         let of = |chunk: usize| {
             let pairs = self.pairs(bonds, displacement, chunk_range(chunk, sites), 0.0);
-            let stiffness =
-                |own: u32, touch: Near<D>| self.pair(own, touch.site) * bonds.volume(touch.site as usize);
+            let stiffness = |own: u32, touch: NearbyParticle<D>| {
+                self.pair(own, touch.site) * bonds.volume(touch.site as usize)
+            };
             let sums = pairs.map(|(own, touching)| touching.map(|t| stiffness(own.site, t)).sum::<f64>());
             sums.fold(0.0, f64::max)
         };
@@ -70,7 +71,7 @@ impl<const D: usize> Contact<D> {
         tangent: f64,
         masses: &mut [f64],
     ) {
-        let of = |own: u32, Near { site, zeta, r, .. }: Near<D>| {
+        let of = |own: u32, NearbyParticle { site, zeta, r, .. }: NearbyParticle<D>| {
             let unit = zeta.map(|x| x / r.max(f64::MIN_POSITIVE));
             // friction acts in all directions
             let mixed = if self.friction > 0.0 { 1.0 } else { mixed(unit) };

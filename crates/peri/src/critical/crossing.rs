@@ -62,7 +62,7 @@ pub struct Crossing {
 
 /// Sums of one family.
 #[derive(Clone, Copy)]
-struct Sums<const D: usize> {
+struct FamilySums<const D: usize> {
     /// Σ w V |ξ_d||ξ|.
     reach: [f64; D],
     /// Σ w V |ξ_d|/|ξ| over short bonds.
@@ -70,7 +70,7 @@ struct Sums<const D: usize> {
     bonds: f64,
 }
 
-impl<const D: usize> Sums<D> {
+impl<const D: usize> FamilySums<D> {
     /// Sums over the family of the particle in a site; its neighbours are assumed to have its surface
     /// factors.
     fn of(bonds: &dyn BodyGeometry<D>, surface: Option<&Field<D>>, site: usize) -> Self {
@@ -102,8 +102,8 @@ impl Crossing {
             None => inside(bonds),
         };
         let whole = !inner.is_empty();
-        let of = |sites: &[u32]| -> Vec<Sums<D>> {
-            sites.par_iter().map(|&site| Sums::of(bonds, surface, site as usize)).collect()
+        let of = |sites: &[u32]| -> Vec<FamilySums<D>> {
+            sites.par_iter().map(|&site| FamilySums::of(bonds, surface, site as usize)).collect()
         };
         let each = if whole {
             of(&inner)
@@ -115,8 +115,9 @@ impl Crossing {
                 .reduce(|a, b| if bonds.bonded(b as usize) > bonds.bonded(a as usize) { b } else { a });
             of(largest.as_slice())
         };
-        let mean =
-            |get: &dyn Fn(&Sums<D>) -> f64| each.iter().map(get).sum::<f64>() / each.len().max(1) as f64;
+        let mean = |get: &dyn Fn(&FamilySums<D>) -> f64| {
+            each.iter().map(get).sum::<f64>() / each.len().max(1) as f64
+        };
         let reaches: Vec<f64> = (0..D).map(|d| mean(&|sums| sums.reach[d])).collect();
         let axis = (0..D).fold(0, |most, d| if reaches[d] > reaches[most] { d } else { most });
         let count = mean(&|sums| sums.bonds);

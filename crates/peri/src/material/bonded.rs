@@ -1,7 +1,7 @@
 //! Bond laws as materials: no state of a particle, forces by the kernels of [`crate::bonds`].
 
 use super::softened::{Lacking, lacking_energy};
-use super::{Bond, Family, LawCover, LawRange, Material, Response};
+use super::{Bond, Family, LawCover, LawRange, Material, SolverMaterial};
 use crate::bonds::{BodyGeometry, Bonds, Overstretched, Property};
 use crate::error::Error;
 use crate::field::{CHUNK, Field};
@@ -92,7 +92,7 @@ impl<const D: usize> Material<D> for BondMaterial<'_> {
         self.modulus * self.law.tangent() / 3.0
     }
 
-    fn respond<'a>(self, _bonds: &dyn Bonds<D>) -> Box<dyn Response<D> + 'a>
+    fn respond<'a>(self, _bonds: &dyn Bonds<D>) -> Box<dyn SolverMaterial<D> + 'a>
     where
         Self: 'a,
     {
@@ -123,7 +123,7 @@ struct Kernels<'a> {
     lacking: Lacking,
 }
 
-impl<const D: usize> Response<D> for Kernels<'_> {
+impl<const D: usize> SolverMaterial<D> for Kernels<'_> {
     fn bond_law(&self) -> (&dyn BondPotential, f64) {
         (&*self.material.law, self.material.modulus)
     }

@@ -4,7 +4,7 @@
 //! doi:10.1016/j.tafmec.2010.08.001, with the quotient of increments (the displacement-weighted form has
 //! negative stiffness in many iterations).
 
-use super::balance::Goal;
+use super::balance::SearchLimits;
 use super::load_stepping::{Equilibrium, QuasiStatic};
 use super::mass::{has_own_mass, own_mass, update_unit_mass};
 use super::method::Watch;
@@ -41,8 +41,8 @@ impl Default for DynamicRelaxation {
 }
 
 impl DynamicRelaxation {
-    fn goal(&self) -> Goal {
-        Goal { tolerance: self.tolerance, max_iterations: self.max_iterations, accept: self.accept }
+    fn goal(&self) -> SearchLimits {
+        SearchLimits { tolerance: self.tolerance, max_iterations: self.max_iterations, accept: self.accept }
     }
 }
 

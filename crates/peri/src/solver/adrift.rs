@@ -66,7 +66,7 @@ pub struct Stops<const D: usize> {
 
 /// Forces and extent of a part.
 #[derive(Clone, Copy)]
-struct Piece<const D: usize> {
+struct PartLoads<const D: usize> {
     particles: usize,
     /// Components prescribed in any particle.
     held: u8,
@@ -90,12 +90,12 @@ pub fn adrift<const D: usize>(
 ) -> Option<Adrift> {
     let body = loads.body_force.as_ref()?;
     let roots = components(bonds, |_, _| true);
-    let mut pieces: BTreeMap<u32, Piece<D>> = BTreeMap::new();
+    let mut pieces: BTreeMap<u32, PartLoads<D>> = BTreeMap::new();
     for &site in bonds.particles() {
         let (site, root) = (site as usize, roots[site as usize]);
         let (volume, force, rest) = (bonds.volume(site), body.get(site), bonds.position(site));
         let moved = displacement.map_or([0.0; D], |field| field.get(site));
-        let piece = pieces.entry(root).or_insert(Piece {
+        let piece = pieces.entry(root).or_insert(PartLoads {
             particles: 0,
             held: 0,
             force: [0.0; D],
@@ -115,10 +115,10 @@ pub fn adrift<const D: usize>(
             piece.extent[d] = [piece.extent[d][0].min(place), piece.extent[d][1].max(place)];
         }
     }
-    let holds = |piece: &Piece<D>, d: usize| {
+    let holds = |piece: &PartLoads<D>, d: usize| {
         let sign = piece.force[d].signum();
         let middle = piece.middle[d] / piece.particles as f64;
-        let ahead = |other: &Piece<D>| {
+        let ahead = |other: &PartLoads<D>| {
             let end = if sign > 0.0 { other.extent[d][1] } else { -other.extent[d][0] };
             other.held >> d & 1 == 1 && end > sign * middle
         };

@@ -7,7 +7,7 @@
 //!   that grips move without resistance;
 //! - what rounding of displacements alone makes of forces, 4ε‖s u‖₂, over the tolerance.
 
-use super::passes::Sums;
+use super::passes::ForceSums;
 use super::scale::Balance;
 use super::state::State;
 use super::system::System;
@@ -24,7 +24,7 @@ const LOOK: u64 = 50;
 
 /// Required balance of forces, and limits of a search.
 #[derive(Clone, Copy, Debug)]
-pub struct Goal {
+pub struct SearchLimits {
     /// Out-of-balance force over reference force.
     pub tolerance: f64,
     /// Limit of iterations.
@@ -33,7 +33,7 @@ pub struct Goal {
     pub accept: f64,
 }
 
-impl Sums {
+impl ForceSums {
     /// Returns true if every sum is finite.
     pub fn is_finite(&self) -> bool {
         let sums = [self.free, self.constrained, self.external, self.quotient_top, self.quotient_bottom];
@@ -54,7 +54,7 @@ impl Sums {
 
 impl<const D: usize> State<D> {
     /// Records the sums of an iterate: its residual, relative to the floor of its reference.
-    pub(super) fn note(&mut self, system: &System<D>, sums: &Sums, goal: &Goal) {
+    pub(super) fn note(&mut self, system: &System<D>, sums: &ForceSums, goal: &SearchLimits) {
         if self.counts.iteration.is_multiple_of(LOOK) || self.convergence.floor == 0.0 {
             let (scale, factor) = (&system.scale, system.factors[self.step]);
             let rounding = ROUNDING * f64::EPSILON * scale.moved(&self.displacement) / goal.tolerance;
@@ -70,7 +70,7 @@ impl<const D: usize> State<D> {
     ///
     /// # Errors
     /// [`Error::NotConverged`] if all iterations are used.
-    pub(super) fn is_balanced(&mut self, goal: &Goal, broken: bool) -> Result<bool, Error> {
+    pub(super) fn is_balanced(&mut self, goal: &SearchLimits, broken: bool) -> Result<bool, Error> {
         let balanced = self.convergence.residual <= goal.tolerance;
         let spent = self.counts.iteration >= goal.max_iterations;
         if !broken && (balanced || (spent && self.convergence.residual <= goal.accept)) {

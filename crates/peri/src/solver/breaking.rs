@@ -1,7 +1,7 @@
 //! Breaking and softening of bonds.
 
 use super::criterion::{Bilinear, Criterion, Policy, most};
-use super::fracture::Event;
+use super::fracture::BreakingEvent;
 use super::state::State;
 use super::system::System;
 use crate::bonds::{Neighbour, Overstretched, Softened, fingerprint};
@@ -101,7 +101,7 @@ impl<const D: usize> System<'_, D> {
         let [factor, pull, push] = state.control.balanced;
         let load = self.response(factor, (pull, push)).0;
         if bonds > 0 {
-            state.fracture.events.push(Event {
+            state.fracture.events.push(BreakingEvent {
                 step: state.step,
                 bonds,
                 fingerprint: fingerprint(&list),

@@ -2,11 +2,11 @@
 //! Wright, Numerical Optimization (2006), §7.2; the step ends where the slope along the direction has fallen
 //! enough (the curvature condition), found by secants.
 
-use super::balance::Goal;
+use super::balance::SearchLimits;
 use super::load_stepping::{Equilibrium, QuasiStatic};
-use super::memory::Memory;
+use super::memory::LbfgsMemory;
 use super::method::Watch;
-use super::passes::{Sums, gradient_pass};
+use super::passes::{ForceSums, gradient_pass};
 use super::places::Places;
 use super::preconditioner::Preconditioner;
 use super::record::Status;
@@ -79,8 +79,8 @@ impl Default for Lbfgs {
 }
 
 impl Lbfgs {
-    fn goal(&self) -> Goal {
-        Goal { tolerance: self.tolerance, max_iterations: self.max_iterations, accept: self.accept }
+    fn goal(&self) -> SearchLimits {
+        SearchLimits { tolerance: self.tolerance, max_iterations: self.max_iterations, accept: self.accept }
     }
 }
 
@@ -94,7 +94,7 @@ impl<const D: usize> QuasiStatic<D> for Lbfgs {
 pub struct LbfgsSolver<const D: usize> {
     settings: Lbfgs,
     preconditioner: Preconditioner<D>,
-    memory: Memory<D>,
+    memory: LbfgsMemory<D>,
     /// Positions of particles in storage: all fields below are over particles.
     places: Places,
     /// Gradients −V F of the energy at the iterate and at the trial, 0 where constrained.
@@ -117,17 +117,17 @@ pub struct LbfgsSolver<const D: usize> {
 
 /// A point along a search direction.
 #[derive(Clone, Copy)]
-struct Point {
-    sums: Sums,
+struct LinePoint {
+    sums: ForceSums,
     observed: StretchRange,
     /// Derivative of the energy along the direction.
     slope: f64,
 }
 
 /// Result of a line search.
-enum Search {
+enum LineSearch {
     /// Accepted step.
-    Found(f64, Point),
+    Found(f64, LinePoint),
     /// No step found: the iterate is unchanged.
     Failed,
 }
@@ -138,7 +138,7 @@ impl<const D: usize> LbfgsSolver<D> {
         Self {
             settings,
             preconditioner: Preconditioner::new(),
-            memory: Memory::new(settings.memory),
+            memory: LbfgsMemory::new(settings.memory),
             places: Places::default(),
             gradient: Field::zeros(0),
             trial: Field::zeros(0),
@@ -188,18 +188,18 @@ impl<const D: usize> LbfgsSolver<D> {
     }
 
     /// Computes forces at the present displacement; their gradient goes to `self.trial`.
-    fn evaluate(&mut self, system: &mut System<D>, state: &mut State<D>) -> Point {
+    fn evaluate(&mut self, system: &mut System<D>, state: &mut State<D>) -> LinePoint {
         let factor = system.factors[state.step];
         system.prepare(&state.displacement);
         let body = (&self.places, self.preconditioner.volumes());
         let (sums, observed, slope) =
             gradient_pass(system, state, body, &self.direction, factor, &mut self.trial);
         system.count_evaluation(state);
-        Point { sums, observed, slope }
+        LinePoint { sums, observed, slope }
     }
 
     /// Evaluates, and again if the fitted law had to be widened.
-    fn look(&mut self, system: &mut System<D>, state: &mut State<D>) -> Result<Point, Error> {
+    fn look(&mut self, system: &mut System<D>, state: &mut State<D>) -> Result<LinePoint, Error> {
         let point = self.evaluate(system, state);
         if !point.sums.is_finite() {
             return Ok(point);
@@ -230,9 +230,9 @@ impl<const D: usize> LbfgsSolver<D> {
         &mut self,
         system: &mut System<D>,
         state: &mut State<D>,
-        start: &Point,
+        start: &LinePoint,
         slope: f64,
-    ) -> Result<Search, Error> {
+    ) -> Result<LineSearch, Error> {
         let [least, most] = allowed(start.observed);
         let longest = self.longest_step(system, state, most);
         // the slope is too steep below `low`; above `high` it has turned, or the body is torn
@@ -254,7 +254,7 @@ impl<const D: usize> LbfgsSolver<D> {
             if point.sums.residual(state.convergence.floor) <= self.settings.tolerance
                 || point.slope.abs() <= SLOPE * slope.abs()
             {
-                return Ok(Search::Found(step, point));
+                return Ok(LineSearch::Found(step, point));
             }
             let change = point.slope - low_slope;
             let secant = if change > 0.0 { low - low_slope * (step - low) / change } else { f64::INFINITY };
@@ -264,14 +264,14 @@ impl<const D: usize> LbfgsSolver<D> {
             } else {
                 // hardly any curvature so far: farther, unless the step is limited or long enough
                 if high.is_finite() || trial > 2 || step >= longest {
-                    return Ok(Search::Found(step, point));
+                    return Ok(LineSearch::Found(step, point));
                 }
                 (low, low_slope) = (step, point.slope);
                 step = secant.clamp(1.5 * step, GROWTH * step).min(longest);
             }
         }
         self.step(state, -at);
-        Ok(Search::Failed)
+        Ok(LineSearch::Failed)
     }
 
     /// Longest step along the direction if bonds soften at stretches up to e = `most`, or particles are in
@@ -301,14 +301,14 @@ impl<const D: usize> LbfgsSolver<D> {
         &mut self,
         system: &mut System<D>,
         state: &mut State<D>,
-        point: &Point,
-    ) -> Result<Option<Point>, Error> {
+        point: &LinePoint,
+    ) -> Result<Option<LinePoint>, Error> {
         let slope = self.direct();
         if slope == 0.0 || !slope.is_finite() {
             return Ok(None);
         }
         match self.search(system, state, point, slope)? {
-            Search::Found(step, point) => {
+            LineSearch::Found(step, point) => {
                 std::mem::swap(&mut self.gradient, &mut self.trial);
                 self.preconditioner.apply(
                     &self.places,
@@ -326,7 +326,7 @@ impl<const D: usize> LbfgsSolver<D> {
                 std::mem::swap(&mut self.image, &mut self.trial_image);
                 Ok(Some(point))
             }
-            Search::Failed => Ok(None),
+            LineSearch::Failed => Ok(None),
         }
     }
 
@@ -348,7 +348,7 @@ impl<const D: usize> LbfgsSolver<D> {
     }
 
     /// Computes forces and gradient of an iterate that no search produced.
-    fn arrive(&mut self, system: &mut System<D>, state: &mut State<D>) -> Result<Point, Error> {
+    fn arrive(&mut self, system: &mut System<D>, state: &mut State<D>) -> Result<LinePoint, Error> {
         let point = self.look(system, state)?;
         if !point.sums.is_finite() {
             return Err(system.not_finite(state));

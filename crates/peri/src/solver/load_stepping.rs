@@ -1,7 +1,7 @@
 //! Load stepping: a first guess, an equilibrium, the bonds that break in it, the next equilibrium.
 
-use super::method::{Finished, Method, Watch};
-use super::record::Record;
+use super::method::{Method, StepCallback, Watch};
+use super::record::StepRecord;
 use super::scale::{Balance, Scale};
 use super::state::State;
 use super::system::System;
@@ -44,7 +44,7 @@ impl<const D: usize, M: QuasiStatic<D>> Method<D> for M {
         system: &mut System<D>,
         state: &mut State<D>,
         watch: &mut Watch<D>,
-        finished: &mut Finished<D>,
+        finished: &mut StepCallback<D>,
     ) -> Result<(), Error> {
         load_stepping(&mut self.solver(), system, state, watch, finished)
     }
@@ -62,7 +62,7 @@ pub fn load_stepping<const D: usize>(
     system: &mut System<D>,
     state: &mut State<D>,
     watch: &mut Watch<D>,
-    finished: &mut Finished<D>,
+    finished: &mut StepCallback<D>,
 ) -> Result<(), Error> {
     if state.step == 0 && !state.control.predicted {
         system.refuse_inverted(&system.factors)?;
@@ -79,7 +79,7 @@ fn step_by_step<const D: usize>(
     system: &mut System<D>,
     state: &mut State<D>,
     watch: &mut Watch<D>,
-    finished: &mut Finished<D>,
+    finished: &mut StepCallback<D>,
 ) -> Result<(), Error> {
     let stiffness = system.stiffness_at_rest();
     // from the reference state: an interrupted run must make the same guess
@@ -251,7 +251,7 @@ fn record<const D: usize>(system: &mut System<D>, state: &mut State<D>) {
     let stored = system.stored_energy(state, system.fitted_part(observed));
     let row = system.row(state, state.control.balanced, observed, stored);
     let (residual, rounds) = (state.convergence.residual, state.control.round);
-    state.history.push(Record { residual, rounds, balance, time: 0.0, kinetic: 0.0, damped: 0.0, ..row });
+    state.history.push(StepRecord { residual, rounds, balance, time: 0.0, kinetic: 0.0, damped: 0.0, ..row });
 }
 
 /// Returns true if the load has fallen below the fraction of its largest value at which the run stops.

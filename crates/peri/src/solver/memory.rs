@@ -19,7 +19,7 @@ const BLOCK: usize = 512;
 type Single<const D: usize> = [Vec<f32>; D];
 
 /// A step and the change of the gradient.
-struct Pair<const D: usize> {
+struct StepPair<const D: usize> {
     /// s.
     step: Single<D>,
     /// w = B y.
@@ -34,16 +34,16 @@ struct Pair<const D: usize> {
 }
 
 /// The pairs, oldest first.
-pub struct Memory<const D: usize> {
+pub struct LbfgsMemory<const D: usize> {
     most: usize,
-    pairs: VecDeque<Pair<D>>,
+    pairs: VecDeque<StepPair<D>>,
     /// Fields to be reused.
     spare: Vec<Single<D>>,
     /// Scale of the initial inverse; 1 until a pair is known.
     scale: f64,
 }
 
-impl<const D: usize> Memory<D> {
+impl<const D: usize> LbfgsMemory<D> {
     /// Creates a memory for `most` pairs.
     pub fn new(most: usize) -> Self {
         Self { most, pairs: VecDeque::new(), spare: Vec::new(), scale: 1.0 }
@@ -110,7 +110,7 @@ impl<const D: usize> Memory<D> {
                         let (s, w) = (&pair.step[c][place.clone()], &pair.image[c][place.clone()]);
                         arch.dispatch(Combine { out: &mut *out, scaled: scale * a, w, weight: *weight, s });
                     }
-                    sum += arch.dispatch(Product { a: out, b: g });
+                    sum += arch.dispatch(DotProduct { a: out, b: g });
                 }
             }
             sum
@@ -159,7 +159,7 @@ impl<const D: usize> Memory<D> {
                         let [wide_s, wide_w] = wide.each_mut().map(|wide| &mut wide[..y.len()]);
                         arch.dispatch(Widen { from: s, to: &mut *wide_s });
                         arch.dispatch(Widen { from: w, to: &mut *wide_w });
-                        let products = arch.dispatch(Products { s: wide_s, w: wide_w, y, g });
+                        let products = arch.dispatch(PairProducts { s: wide_s, w: wide_w, y, g });
                         for k in 0..4 {
                             sums[k] += products[k];
                         }
@@ -195,7 +195,7 @@ impl<const D: usize> Memory<D> {
             self.spare.extend([oldest.step, oldest.image]);
         }
         let (later, gradient) = (VecDeque::new(), [sums[2], sums[3]]);
-        self.pairs.push_back(Pair { step: new_step, image: new_image, curvature, size, later, gradient });
+        self.pairs.push_back(StepPair { step: new_step, image: new_image, curvature, size, later, gradient });
     }
 }
 
@@ -224,14 +224,14 @@ impl NullaryFnOnce for Widen<'_> {
 }
 
 /// s·y, w·y, s·g, w·g.
-struct Products<'a> {
+struct PairProducts<'a> {
     s: &'a [f64],
     w: &'a [f64],
     y: &'a [f64],
     g: &'a [f64],
 }
 
-impl WithSimd for Products<'_> {
+impl WithSimd for PairProducts<'_> {
     type Output = [f64; 4];
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> [f64; 4] {
@@ -284,12 +284,12 @@ impl NullaryFnOnce for Combine<'_> {
 }
 
 /// a·b.
-struct Product<'a> {
+struct DotProduct<'a> {
     a: &'a [f64],
     b: &'a [f64],
 }
 
-impl NullaryFnOnce for Product<'_> {
+impl NullaryFnOnce for DotProduct<'_> {
     type Output = f64;
     #[inline(always)]
     fn call(self) -> f64 {

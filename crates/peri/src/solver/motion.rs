@@ -15,7 +15,7 @@ pub struct Motion {
     /// Bounds of the time step.
     pub limits: StepLimits,
     /// Energies.
-    pub energies: Energies,
+    pub energies: DynamicEnergies,
     /// Stretches at the last check.
     pub(super) look: StretchLook,
     /// Stiffness control of materials whose stiffness depends on the displacement, see [`super::pace`].
@@ -58,7 +58,7 @@ pub struct StepLimits {
 
 /// Energies of explicit dynamics, J.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Energies {
+pub struct DynamicEnergies {
     /// Kinetic energy.
     pub kinetic: f64,
     /// Energy dissipated by damping.

@@ -1,7 +1,7 @@
 //! Length of explicit steps for solids, whose stiffness depends on the displacement: it grows with every
 //! stretch, under compression, and when bonds break.
 //!
-//! m, [`crate::material::Response::frequency_bound`], bounds ρω² of a state at the cost of at most a force.
+//! m, [`crate::material::SolverMaterial::frequency_bound`], bounds ρω² of a state at the cost of at most a force.
 //! The Lanczos iteration gives ω² itself and with it the ratio r = ρω²/m; between two of them ω² is estimated
 //! as r m/ρ. Steps are those of [`MARGIN`] times that. m is checked at the end of a step, before its forces
 //! act: a step whose end would have required a shorter one, such as one that crushes a particle, is undone

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Particles in consecutive sites of one work item.
-struct Run {
+struct SiteRun {
     /// First site, in its work item.
     site: usize,
     /// First particle, in its work item.
@@ -22,7 +22,7 @@ struct Run {
 /// Positions of particles in storage.
 #[derive(Default)]
 pub struct Places {
-    runs: Vec<Run>,
+    runs: Vec<SiteRun>,
     /// The runs of each work item, its first particle, and the number of particles at the end.
     items: Vec<Range<usize>>,
     first: Vec<usize>,
@@ -42,7 +42,7 @@ impl Places {
                 let (site, particle) = (particles[next] as usize % CHUNK, next - first);
                 match places.runs[begin..].last_mut() {
                     Some(run) if run.site + run.length == site => run.length += 1,
-                    _ => places.runs.push(Run { site, particle, length: 1 }),
+                    _ => places.runs.push(SiteRun { site, particle, length: 1 }),
                 }
                 next += 1;
             }

@@ -1,7 +1,7 @@
 //! Approximate inverse of the body's stiffness, for gradients of its energy: B g = ω g/(V M) + P A_c⁻¹ Pᵀ g,
 //! with the Gershgorin mass M of dynamic relaxation and a coarse level.
 
-use super::coarse::{Anchor, Body, Coarse, Survey};
+use super::coarse::{CoarseBody, CoarseLevel, PlaneAnchor, Survey};
 use super::mass::{has_own_mass, own_mass, update_unit_mass};
 use super::places::{Places, in_order};
 use super::state::State;
@@ -25,7 +25,7 @@ pub struct Preconditioner<const D: usize> {
     unit_mass: Vec<f64>,
     /// The smallest of `local`, used for unsupported particles.
     least: f64,
-    coarse: Option<Coarse<D>>,
+    coarse: Option<CoarseLevel<D>>,
 }
 
 impl<const D: usize> Preconditioner<D> {
@@ -73,7 +73,7 @@ impl<const D: usize> Preconditioner<D> {
                     springs[site] += stiffness * weight * weight / bonds.volume(site);
                     head = if weight > head.1 { (site, weight) } else { head };
                 }
-                anchors.push(Anchor { site: head.0 as u32, normal, stiffness });
+                anchors.push(PlaneAnchor { site: head.0 as u32, normal, stiffness });
             });
         }
         let local = |(&site, volume): (&u32, &f64)| {
@@ -86,7 +86,7 @@ impl<const D: usize> Preconditioner<D> {
             self.least = 1.0;
         }
         self.local.iter_mut().filter(|local| local.is_infinite()).for_each(|local| *local = self.least);
-        let body = Body {
+        let body = CoarseBody {
             bonds,
             loads: &system.loads,
             displacement: &state.displacement,
@@ -97,7 +97,7 @@ impl<const D: usize> Preconditioner<D> {
         };
         let old = self.coarse.take();
         let most = (self.volumes.len() / SHARE[D - 2]).clamp(LEAST[D - 2], MOST[D - 2]);
-        self.coarse = Coarse::new(&body, coarsening * bonds.spacing(), most, old);
+        self.coarse = CoarseLevel::new(&body, coarsening * bonds.spacing(), most, old);
     }
 
     /// Updates the local part where bonds broke; the coarse part stays.
@@ -152,6 +152,6 @@ impl<const D: usize> Preconditioner<D> {
 
     /// Degrees of freedom of the coarse level and entries of its factors.
     pub fn coarse_size(&self) -> [usize; 2] {
-        self.coarse.as_ref().map_or([0; 2], Coarse::size)
+        self.coarse.as_ref().map_or([0; 2], CoarseLevel::size)
     }
 }

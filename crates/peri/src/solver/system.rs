@@ -2,14 +2,14 @@
 
 use super::criterion::Breaking;
 use super::load::Loads;
-use super::record::Record;
+use super::record::StepRecord;
 use super::scale::{Balance, Scale};
 use super::state::State;
 use crate::bonds::{Bonds, StretchScan, not_finite};
-use crate::contact::{Contact, ContactSummary, Grip, Plane, PlaneReaction};
+use crate::contact::{Contact, ContactSummary, Grip, PlaneReaction, RigidPlane};
 use crate::error::Error;
 use crate::field::Field;
-use crate::material::{Material, Response};
+use crate::material::{Material, SolverMaterial};
 use crate::potential::StretchRange;
 use std::borrow::Cow;
 
@@ -23,7 +23,7 @@ pub struct System<'a, const D: usize> {
     /// Bonds; the solver sets their law.
     pub bonds: &'a mut dyn Bonds<D>,
     /// Material in these bonds.
-    pub(super) material: Box<dyn Response<D> + 'a>,
+    pub(super) material: Box<dyn SolverMaterial<D> + 'a>,
     /// Loads at factor 1. Particles without bonds lose their body forces.
     pub loads: Cow<'a, Loads<D>>,
     /// Load factor at the end of each step.
@@ -48,15 +48,15 @@ pub struct System<'a, const D: usize> {
     pub(super) scale: Scale,
     /// Load factor and its rate over the time, s, in explicit dynamics, instead of the ramp.
     pub course: Option<&'a LoadCurve<'a>>,
-    /// Values recorded in every row of the history, see [`Record::seen`](super::Record::seen).
-    pub observer: Option<&'a Observer<'a, D>>,
+    /// Values recorded in every row of the history, see [`StepRecord::seen`](super::Record::seen).
+    pub observer: Option<&'a StateObserver<'a, D>>,
 }
 
 /// Load factor and its rate, 1/s, at a time, s.
 pub type LoadCurve<'a> = dyn Fn(f64) -> (f64, f64) + Sync + 'a;
 
 /// Values of a body in a state, for its history.
-pub type Observer<'a, const D: usize> = dyn Fn(&dyn Bonds<D>, &State<D>) -> Vec<f64> + Sync + 'a;
+pub type StateObserver<'a, const D: usize> = dyn Fn(&dyn Bonds<D>, &State<D>) -> Vec<f64> + Sync + 'a;
 
 impl<'a, const D: usize> System<'a, D> {
     /// Creates the system of a body whose bonds do not break.
@@ -73,7 +73,7 @@ impl<'a, const D: usize> System<'a, D> {
     /// Creates the system as [`Self::new`] does, from a material already prepared for solvers.
     pub fn of_response(
         bonds: &'a mut dyn Bonds<D>,
-        material: Box<dyn Response<D> + 'a>,
+        material: Box<dyn SolverMaterial<D> + 'a>,
         loads: &'a Loads<D>,
         factors: &'a [f64],
     ) -> Self {
@@ -166,7 +166,7 @@ impl<'a, const D: usize> System<'a, D> {
     /// Conjugate sums of loads and rigid planes, see [`Loads::conjugates`].
     pub(super) fn conjugates(&self, state: &State<D>) -> (f64, f64) {
         let (pull, push) = self.loads.conjugates(&*self.bonds, &state.displacement, &state.force);
-        let work = |(plane, resting): (&Plane<D>, &PlaneReaction)| {
+        let work = |(plane, resting): (&RigidPlane<D>, &PlaneReaction)| {
             (0..D).map(|d| plane.displacement[d] * resting.force[d]).sum::<f64>()
         };
         let Some(contact) = self.repulsion() else { return (pull, push) };
@@ -289,9 +289,9 @@ impl<'a, const D: usize> System<'a, D> {
         [factor, pull, push]: [f64; 3],
         observed: StretchRange,
         stored: f64,
-    ) -> Record {
+    ) -> StepRecord {
         let (load, displacement) = self.response(factor, (pull, push));
-        Record {
+        StepRecord {
             factor,
             load,
             displacement,

@@ -6,14 +6,16 @@
 //! doi:10.1017/S0962492902000144. Works are sums of ½(force before + force after)·Δu, which change ½ρ(v² −
 //! ¼Δt²a²) exactly: the energies balance to O(Δt²) without drift.
 
-use super::method::{Finished, Method, Watch};
-use super::motion::{BondSums, Energies, Motion, StepLimits, StretchLook};
+use super::method::{Method, StepCallback, Watch};
+use super::motion::{BondSums, DynamicEnergies, Motion, StepLimits, StretchLook};
 use super::record::Status;
 use super::state::State;
 use super::system::System;
 use super::time_step::{critical, largest_frequency_squared};
 use super::verlet_friction::{friction_pass, plane_pass};
-use super::verlet_step::{Sums, VerletStep, force_pass, kick_pass, leap_pass, refresh, stored, volumes};
+use super::verlet_step::{
+    VerletStep, VerletSums, force_pass, kick_pass, leap_pass, refresh, stored, volumes,
+};
 use crate::bonds::{StretchRange, stretch_range};
 use crate::contact::Contact;
 use crate::error::Error;
@@ -82,7 +84,7 @@ impl<const D: usize> Method<D> for VelocityVerlet {
         system: &mut System<D>,
         state: &mut State<D>,
         watch: &mut Watch<D>,
-        finished: &mut Finished<D>,
+        finished: &mut StepCallback<D>,
     ) -> Result<(), Error> {
         self.check()?;
         if !state.motion.begun && system.course.is_none() {
@@ -200,7 +202,7 @@ impl VelocityVerlet {
         });
         let limits =
             StepLimits { critical_step: critical(frequency), contact, bonds, ..StepLimits::default() };
-        let energies = Energies { kinetic, turnover: state.work, ..Energies::default() };
+        let energies = DynamicEnergies { kinetic, turnover: state.work, ..DynamicEnergies::default() };
         state.motion = Motion { begun: true, limits, energies, ..Motion::default() };
         if let Some(found) = self.time_step.filter(|&found| found > state.motion.limits.critical_step) {
             return Err(Error::TimeStep { found, critical: state.motion.limits.critical_step });
@@ -342,7 +344,12 @@ impl VelocityVerlet {
     }
 
     /// Updates the energies of a step and checks them.
-    fn account<const D: usize>(&self, state: &mut State<D>, first: Sums, second: Sums) -> Result<(), Error> {
+    fn account<const D: usize>(
+        &self,
+        state: &mut State<D>,
+        first: VerletSums,
+        second: VerletSums,
+    ) -> Result<(), Error> {
         let motion = &mut state.motion;
         motion.energies.kinetic = second.kinetic;
         motion.energies.damped += first.damped + second.damped;

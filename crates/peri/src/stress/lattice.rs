@@ -1,45 +1,48 @@
 //! Stress on a lattice, where the bond function depends on offsets only: each measure is, bond by bond of the
 //! stencil, a convolution of that bond's forces with fixed weights. The forces are the same for all measures.
 
-use super::convolution::{Shared, Shares, Tap, tiles};
+use super::convolution::{ShareSums, Shared, Tap, tiles};
 use super::pull::forces;
-use super::window::{Averaged, Window, normalise};
-use super::{BallVolume, Loaded, Measure, Measured, ball_volume, cell_fractions, segment_fraction};
+use super::window::{Averaged, StressWindow, normalise};
+use super::{
+    BallVolume, Loaded, MeasuredStress, StressMeasure, ball_volume, cell_fractions, segment_fraction,
+};
 use crate::bonds::{BodyGeometry, LatticeBonds};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::time::Instant;
 
 /// Sums of a measure, and their run time.
-struct Sums<const D: usize> {
-    measure: Measure,
+struct StressSums<const D: usize> {
+    measure: StressMeasure,
     window: Option<Averaged<D>>,
     /// Taps of each bond of half the stencil.
     taps: Vec<Vec<Tap>>,
-    shares: Shares<D>,
+    shares: ShareSums<D>,
     seconds: f64,
 }
 
-impl<const D: usize> Sums<D> {
-    fn new(bonds: &LatticeBonds<D>, state: &Loaded<D>, measure: Measure) -> Self {
+impl<const D: usize> StressSums<D> {
+    fn new(bonds: &LatticeBonds<D>, state: &Loaded<D>, measure: StressMeasure) -> Self {
         let started = Instant::now();
-        let window = measure.is_partition().then(|| Averaged::<D>::new(Window::of(measure), bonds.ratio()));
+        let window =
+            measure.is_partition().then(|| Averaged::<D>::new(StressWindow::of(measure), bonds.ratio()));
         let mut alike = BTreeMap::new();
         let half = half(bonds).iter();
         let taps = half.map(|&offset| taps(bonds, offset, measure, window.as_ref(), &mut alike)).collect();
-        let shares = Shares::new(bonds.sites(), &rim(bonds, state, measure));
+        let shares = ShareSums::new(bonds.sites(), &rim(bonds, state, measure));
         Self { measure, window, taps, shares, seconds: started.elapsed().as_secs_f64() }
     }
 
     /// Divides the sums by the volumes.
-    fn finish(self, bonds: &LatticeBonds<D>, state: &Loaded<D>, ball: BallVolume) -> Measured<D> {
+    fn finish(self, bonds: &LatticeBonds<D>, state: &Loaded<D>, ball: BallVolume) -> MeasuredStress<D> {
         let started = Instant::now();
         let volumes = volumes(bonds, state, self.measure, ball, self.window.as_ref());
         let one = |(&site, volume): (&u32, f64)| {
             self.shares.get(site as usize).map(|row| row.map(|sum| sum / volume))
         };
         let piola = bonds.particles().par_iter().zip(volumes).map(one).collect();
-        Measured { piola, seconds: self.seconds + started.elapsed().as_secs_f64() }
+        MeasuredStress { piola, seconds: self.seconds + started.elapsed().as_secs_f64() }
     }
 }
 
@@ -53,10 +56,11 @@ fn half<const D: usize>(bonds: &LatticeBonds<D>) -> &[[i32; D]] {
 pub fn piolas<const D: usize>(
     bonds: &LatticeBonds<D>,
     state: &Loaded<D>,
-    measures: &[Measure],
+    measures: &[StressMeasure],
     ball: BallVolume,
-) -> Vec<Measured<D>> {
-    let mut all: Vec<Sums<D>> = measures.iter().map(|&measure| Sums::new(bonds, state, measure)).collect();
+) -> Vec<MeasuredStress<D>> {
+    let mut all: Vec<StressSums<D>> =
+        measures.iter().map(|&measure| StressSums::new(bonds, state, measure)).collect();
     let started = Instant::now();
     let reach = all.iter().flat_map(|sums| sums.taps.iter().flatten()).map(|tap| tap.shift.unsigned_abs());
     let longest = half(bonds).iter().map(|&offset| bonds.shift(offset).unsigned_abs());
@@ -75,9 +79,9 @@ pub fn piolas<const D: usize>(
             sums.seconds += started.elapsed().as_secs_f64();
         }
     }
-    let finish = |sums: Sums<D>| {
+    let finish = |sums: StressSums<D>| {
         let measured = sums.finish(bonds, state, ball);
-        Measured { seconds: measured.seconds + seconds, ..measured }
+        MeasuredStress { seconds: measured.seconds + seconds, ..measured }
     };
     all.into_iter().map(finish).collect()
 }
@@ -111,13 +115,13 @@ fn bond_function<const D: usize>(
 fn taps<const D: usize>(
     bonds: &LatticeBonds<D>,
     offset: [i32; D],
-    measure: Measure,
+    measure: StressMeasure,
     window: Option<&Averaged<D>>,
     alike: &mut Alike<D>,
 ) -> Vec<Tap> {
     let weights = match (measure, window) {
-        (Measure::OnePoint, _) => vec![([0; D], 0.5), (offset.map(|o| -o), 0.5)],
-        (Measure::HardyScaled, _) => {
+        (StressMeasure::OnePoint, _) => vec![([0; D], 0.5), (offset.map(|o| -o), 0.5)],
+        (StressMeasure::HardyScaled, _) => {
             let mut weights = crossing(bonds.ratio(), offset, measure);
             normalise(&mut weights);
             weights
@@ -130,7 +134,7 @@ fn taps<const D: usize>(
 
 /// Start of bonds that cross the ball about a particle, and the fraction inside (as printed: ½ with both ends
 /// there).
-fn crossing<const D: usize>(ratio: f64, offset: [i32; D], measure: Measure) -> Vec<([i32; D], f64)> {
+fn crossing<const D: usize>(ratio: f64, offset: [i32; D], measure: StressMeasure) -> Vec<([i32; D], f64)> {
     let square = ratio * ratio;
     let reach = 2 * ratio.ceil() as i32;
     let side = (2 * reach + 1) as usize;
@@ -141,8 +145,8 @@ fn crossing<const D: usize>(ratio: f64, offset: [i32; D], measure: Measure) -> V
             let q = std::array::from_fn(|d| p[d] + f64::from(offset[d]));
             let norm = |x: [f64; D]| x.iter().map(|c| c * c).sum::<f64>();
             let weight = match measure {
-                Measure::AsPublished if norm(p) < square && norm(q) < square => 0.5,
-                Measure::AsPublished => 0.0,
+                StressMeasure::AsPublished if norm(p) < square && norm(q) < square => 0.5,
+                StressMeasure::AsPublished => 0.0,
                 _ => segment_fraction(p, q, square),
             };
             (weight > 0.0).then_some((start, weight))
@@ -151,10 +155,10 @@ fn crossing<const D: usize>(ratio: f64, offset: [i32; D], measure: Measure) -> V
 }
 
 /// Sites near a surface whose windows lack bonds, if existing bonds compensate for them.
-fn rim<const D: usize>(bonds: &LatticeBonds<D>, state: &Loaded<D>, measure: Measure) -> Vec<u32> {
+fn rim<const D: usize>(bonds: &LatticeBonds<D>, state: &Loaded<D>, measure: StressMeasure) -> Vec<u32> {
     let wanted = |site: usize| match measure {
-        Measure::HardyBonds => true,
-        Measure::HardyWindow => false,
+        StressMeasure::HardyBonds => true,
+        StressMeasure::HardyWindow => false,
         _ => measure.is_partition() && !state.missing.is_window(site),
     };
     // no bond that crosses a window begins farther away
@@ -181,7 +185,7 @@ fn rim<const D: usize>(bonds: &LatticeBonds<D>, state: &Loaded<D>, measure: Meas
 fn volumes<const D: usize>(
     bonds: &LatticeBonds<D>,
     state: &Loaded<D>,
-    measure: Measure,
+    measure: StressMeasure,
     ball: BallVolume,
     window: Option<&Averaged<D>>,
 ) -> Vec<f64> {
@@ -194,16 +198,16 @@ fn volumes<const D: usize>(
         offsets.iter().copied().chain([[0; D]]).map(|o| (o, share)).collect::<Vec<_>>()
     };
     let (cells, volume) = match (measure, ball, window) {
-        (Measure::BallShare, BallVolume::Particles, _) => (sites(), whole),
-        (Measure::BallShare, BallVolume::Cells, _) => (cell_fractions::<D>(bonds.ratio()), whole),
-        (Measure::OnePoint, ..) => (Vec::new(), lattice.volume),
-        (Measure::HardyScaled, ..) => (sites(), lattice.volume),
+        (StressMeasure::BallShare, BallVolume::Particles, _) => (sites(), whole),
+        (StressMeasure::BallShare, BallVolume::Cells, _) => (cell_fractions::<D>(bonds.ratio()), whole),
+        (StressMeasure::OnePoint, ..) => (Vec::new(), lattice.volume),
+        (StressMeasure::HardyScaled, ..) => (sites(), lattice.volume),
         (_, _, Some(window)) => (window.cells(), lattice.volume),
         _ => (Vec::new(), whole),
     };
     let shared = |site: usize| match measure {
-        Measure::HardyWindow => true,
-        Measure::HardyBonds => false,
+        StressMeasure::HardyWindow => true,
+        StressMeasure::HardyBonds => false,
         _ => !measure.is_partition() || state.missing.is_window(site),
     };
     shares(bonds, &cells, shared).into_iter().map(|s| s * volume).collect()

@@ -15,7 +15,7 @@ mod window;
 
 pub use ball::{ball_volume, cell_fractions, segment_fraction};
 
-use crate::bonds::{BodyGeometry, BondForces, Bonds, CloudBonds, GradientSums, Kind, LatticeBonds};
+use crate::bonds::{BodyGeometry, BondForces, BondKind, Bonds, CloudBonds, GradientSums, LatticeBonds};
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::potential::KernelFit;
 use rayon::prelude::*;
@@ -23,13 +23,13 @@ use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
 /// A second-order tensor of dimension `D`, row by row.
-pub type Tensor<const D: usize> = [[f64; D]; D];
+pub type StressTensor<const D: usize> = [[f64; D]; D];
 
 /// Measure of stress.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
-pub enum Measure {
+pub enum StressMeasure {
     /// All bonds crossing the ball, by the fraction inside, averaged over the particle's cell: weights that
     /// sum to 1 for every bond offset; [`Missing`] treats surfaces.
     #[default]
@@ -59,7 +59,7 @@ pub enum Measure {
     Constitutive,
 }
 
-impl Measure {
+impl StressMeasure {
     /// All measures of bond forces.
     pub const ALL: [Self; 10] = [
         Self::Hardy,
@@ -125,7 +125,7 @@ impl Missing<'_> {
     }
 }
 
-/// Volume Ω of the averaging ball inside the body, for [`Measure::BallShare`].
+/// Volume Ω of the averaging ball inside the body, for [`StressMeasure::BallShare`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
@@ -154,9 +154,9 @@ pub struct Loaded<'a, const D: usize> {
 
 /// Stress of every particle by one of several measures.
 #[derive(Clone, Debug)]
-pub struct Measured<const D: usize> {
+pub struct MeasuredStress<const D: usize> {
     /// First Piola–Kirchhoff stress, in the order of [`BodyGeometry::particles`], Pa.
-    pub piola: Vec<Tensor<D>>,
+    pub piola: Vec<StressTensor<D>>,
     /// Seconds that this measure takes on its own, including the forces of all bonds, which several measures
     /// on a lattice share.
     pub seconds: f64,
@@ -166,18 +166,18 @@ pub struct Measured<const D: usize> {
 pub fn piolas<const D: usize>(
     bonds: &dyn Bonds<D>,
     state: &Loaded<D>,
-    measures: &[Measure],
+    measures: &[StressMeasure],
     ball: BallVolume,
-) -> Vec<Measured<D>> {
-    if let Kind::Lattice(lattice) = bonds.kind()
-        && !measures.contains(&Measure::Constitutive)
+) -> Vec<MeasuredStress<D>> {
+    if let BondKind::Lattice(lattice) = bonds.kind()
+        && !measures.contains(&StressMeasure::Constitutive)
     {
         return lattice::piolas(lattice, state, measures, ball);
     }
-    let one = |&measure: &Measure| {
+    let one = |&measure: &StressMeasure| {
         let started = Instant::now();
         let piola = piola(bonds, state, measure, ball);
-        Measured { piola, seconds: started.elapsed().as_secs_f64() }
+        MeasuredStress { piola, seconds: started.elapsed().as_secs_f64() }
     };
     measures.iter().map(one).collect()
 }
@@ -187,12 +187,12 @@ pub fn piolas<const D: usize>(
 pub fn piola<const D: usize>(
     bonds: &dyn Bonds<D>,
     state: &Loaded<D>,
-    measure: Measure,
+    measure: StressMeasure,
     ball: BallVolume,
-) -> Vec<Tensor<D>> {
+) -> Vec<StressTensor<D>> {
     match bonds.kind() {
-        Kind::Lattice(lattice) => piola_on_lattice(lattice, state, measure, ball),
-        Kind::Cloud(cloud) => piola_in_cloud(cloud, state, measure, ball),
+        BondKind::Lattice(lattice) => piola_on_lattice(lattice, state, measure, ball),
+        BondKind::Cloud(cloud) => piola_in_cloud(cloud, state, measure, ball),
     }
 }
 
@@ -201,10 +201,10 @@ pub fn piola<const D: usize>(
 pub fn piola_on_lattice<const D: usize>(
     bonds: &LatticeBonds<D>,
     state: &Loaded<D>,
-    measure: Measure,
+    measure: StressMeasure,
     ball: BallVolume,
-) -> Vec<Tensor<D>> {
-    if measure == Measure::Constitutive {
+) -> Vec<StressTensor<D>> {
+    if measure == StressMeasure::Constitutive {
         return vec![[[f64::NAN; D]; D]; bonds.particles().len()];
     }
     lattice::piolas(bonds, state, &[measure], ball).swap_remove(0).piola
@@ -216,14 +216,14 @@ pub fn piola_on_lattice<const D: usize>(
 /// A cloud has neither common offsets of bonds nor cells: a measure whose weights sum to 1 distributes every
 /// bond over the particles whose windows it crosses, by volume × bond function, so that the sum of P V is
 /// that of f ⊗ ξ over all bonds; [`Loaded::missing`] has no effect. Measures that need a lattice
-/// ([`Measure::needs_lattice`]) are treated as [`Measure::Hardy`]; scenes refuse them.
+/// ([`StressMeasure::needs_lattice`]) are treated as [`StressMeasure::Hardy`]; scenes refuse them.
 pub fn piola_in_cloud<const D: usize>(
     bonds: &CloudBonds<D>,
     state: &Loaded<D>,
-    measure: Measure,
+    measure: StressMeasure,
     ball: BallVolume,
-) -> Vec<Tensor<D>> {
-    if measure == Measure::Constitutive {
+) -> Vec<StressTensor<D>> {
+    if measure == StressMeasure::Constitutive {
         return vec![[[f64::NAN; D]; D]; bonds.particles().len()];
     }
     cloud::piola(bonds, state, measure, ball)
@@ -248,7 +248,7 @@ pub(crate) fn force_over_length<const D: usize>(
 pub fn deformation_gradients<const D: usize>(
     bonds: &dyn BondForces<D>,
     displacement: &Field<D>,
-) -> Vec<Tensor<D>> {
+) -> Vec<StressTensor<D>> {
     let particles = bonds.particles();
     // sums of one work item; `None` if bonds have to be visited one by one
     let chunk = |chunk: usize| {
@@ -258,7 +258,7 @@ pub fn deformation_gradients<const D: usize>(
             [sites.start, sites.end].map(|end| particles.partition_point(|&s| (s as usize) < end));
         Some(particles[from..to].iter().map(|&site| gradient(&sums[site as usize - sites.start])).collect())
     };
-    let chunks: Option<Vec<Vec<Tensor<D>>>> =
+    let chunks: Option<Vec<Vec<StressTensor<D>>>> =
         (0..bonds.sites().div_ceil(CHUNK)).into_par_iter().map(chunk).collect();
     if let Some(chunks) = chunks {
         return chunks.concat();
@@ -282,10 +282,10 @@ pub fn deformation_gradients<const D: usize>(
 }
 
 /// Computes 1 + change·shape⁻¹; the identity if there is no inverse.
-fn gradient<const D: usize>(sums: &GradientSums<D>) -> Tensor<D> {
-    let matrix = |t: &Tensor<D>| nalgebra::SMatrix::<f64, D, D>::from_fn(|a, b| t[a][b]);
+fn gradient<const D: usize>(sums: &GradientSums<D>) -> StressTensor<D> {
+    let matrix = |t: &StressTensor<D>| nalgebra::SMatrix::<f64, D, D>::from_fn(|a, b| t[a][b]);
     let shape = matrix(&sums.shape);
-    let mut gradient: Tensor<D> =
+    let mut gradient: StressTensor<D> =
         std::array::from_fn(|a| std::array::from_fn(|b| f64::from(u8::from(a == b))));
     let singular = determinant::<D>(|a, b| shape[(a, b)]).abs() <= 1e-9 * shape.trace().powi(D as i32);
     if let Some(inverse) = shape.try_inverse().filter(|_| !singular) {
@@ -300,8 +300,11 @@ fn gradient<const D: usize>(sums: &GradientSums<D>) -> Tensor<D> {
 }
 
 /// Computes the Cauchy stress σ = P Fᵀ/J, Eq. (2.32), particle by particle.
-pub fn cauchy<const D: usize>(piola: &[Tensor<D>], gradients: &[Tensor<D>]) -> Vec<Tensor<D>> {
-    let one = |(p, f): (&Tensor<D>, &Tensor<D>)| -> Tensor<D> {
+pub fn cauchy<const D: usize>(
+    piola: &[StressTensor<D>],
+    gradients: &[StressTensor<D>],
+) -> Vec<StressTensor<D>> {
+    let one = |(p, f): (&StressTensor<D>, &StressTensor<D>)| -> StressTensor<D> {
         let jacobian = determinant::<D>(|a, b| f[a][b]);
         // an inverted family has no Cauchy stress; its nominal stress replaces it
         if jacobian <= 0.0 {

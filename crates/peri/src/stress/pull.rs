@@ -34,7 +34,7 @@ pub fn forces<const D: usize>(
         inverse_length: 1.0 / square.sqrt(),
         scale: 2.0 * state.modulus * volume * volume / square.sqrt(),
     };
-    Arch::new().dispatch(Chunk { pull, start, filled, out });
+    Arch::new().dispatch(ForceChunk { pull, start, filled, out });
 }
 
 /// scale·weight·q(e) ζ, from the displacements of both ends.
@@ -51,14 +51,14 @@ struct Pull<'a, const D: usize> {
 }
 
 /// Runs [`forces`] over a chunk.
-struct Chunk<'a, const D: usize> {
+struct ForceChunk<'a, const D: usize> {
     pull: Pull<'a, D>,
     start: usize,
     filled: &'a [bool],
     out: &'a mut [f64],
 }
 
-impl<const D: usize> WithSimd for Chunk<'_, D> {
+impl<const D: usize> WithSimd for ForceChunk<'_, D> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {

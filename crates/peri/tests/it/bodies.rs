@@ -113,7 +113,7 @@ impl<const D: usize> Body<D> {
 
     /// Pairs (I, J), I < J, with their reference bond and weight (volume × surface correction), by comparing
     /// all.
-    pub fn pairs(&self, points: &[[f64; D]]) -> Vec<Pair<D>> {
+    pub fn pairs(&self, points: &[[f64; D]]) -> Vec<ContactPair<D>> {
         // the smallest gap between lattice distances near the horizons used here is far above this rounding
         // margin
         let square = self.horizon().powi(2) * (1.0 + 1e-12);
@@ -126,7 +126,7 @@ impl<const D: usize> Body<D> {
                     let part = (self.horizon() + 0.5 * self.spacing - length) / self.spacing;
                     let linear = self.volume_correction == VolumeCorrection::Linear;
                     let weight = if linear { part.clamp(0.0, 1.0) } else { 1.0 };
-                    pairs.push(Pair { i, j, bond, length, weight });
+                    pairs.push(ContactPair { i, j, bond, length, weight });
                 }
             }
         }
@@ -137,7 +137,7 @@ impl<const D: usize> Body<D> {
     }
 
     /// Madenci & Oterkus (2014), §4.2, as in `s12_mosurf.py`.
-    fn correct(&self, pairs: &mut [Pair<D>], count: usize, stiffness: f64) {
+    fn correct(&self, pairs: &mut [ContactPair<D>], count: usize, stiffness: f64) {
         let volume = self.spacing.powi(D as i32);
         let mut energy = vec![[0.0; D]; count];
         for pair in pairs.iter() {
@@ -163,7 +163,7 @@ impl<const D: usize> Body<D> {
     /// Force densities f_I = Σ_J 2kθ t(λ) w V_J ζ/|ζ|, and the sum of the magnitudes in each.
     pub fn plain_forces(
         &self,
-        pairs: &[Pair<D>],
+        pairs: &[ContactPair<D>],
         law: &dyn BondPotential,
         displacement: &[[f64; D]],
     ) -> (Vec<[f64; D]>, Vec<f64>) {
@@ -195,7 +195,7 @@ impl Slit {
 
 /// A bond between two particles.
 #[derive(Clone, Copy)]
-pub struct Pair<const D: usize> {
+pub struct ContactPair<const D: usize> {
     pub i: usize,
     pub j: usize,
     pub bond: [f64; D],
@@ -203,7 +203,7 @@ pub struct Pair<const D: usize> {
     pub weight: f64,
 }
 
-impl<const D: usize> Pair<D> {
+impl<const D: usize> ContactPair<D> {
     /// ζ and the stretch λ.
     pub fn deformed(&self, displacement: &[[f64; D]]) -> ([f64; D], f64) {
         let zeta = std::array::from_fn(|d| self.bond[d] + displacement[self.j][d] - displacement[self.i][d]);
@@ -212,7 +212,7 @@ impl<const D: usize> Pair<D> {
 }
 
 /// Smallest and largest stretch of all pairs, a little widened.
-pub fn stretch_range<const D: usize>(pairs: &[Pair<D>], displacement: &[[f64; D]]) -> [f64; 2] {
+pub fn stretch_range<const D: usize>(pairs: &[ContactPair<D>], displacement: &[[f64; D]]) -> [f64; 2] {
     let range = pairs
         .iter()
         .map(|pair| pair.deformed(displacement).1)

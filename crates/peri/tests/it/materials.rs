@@ -6,19 +6,19 @@ use crate::linear_solid::{LinearSolid, poisson_ratio};
 use evidence::near;
 use peri::bonds::{BodyGeometry, Bonds, Overstretched};
 use peri::field::Field;
-use peri::material::{BondMaterial, LawCover, Material, Pointwise, Response};
+use peri::material::{BondMaterial, LawCover, Material, Pointwise, SolverMaterial};
 use peri::solver::{
     Breaking, DynamicRelaxation, Lbfgs, Method, Policy, State, Status, System, VelocityVerlet,
 };
 
 /// Makes a material at work in a body.
-pub type Make<'m, const D: usize> = &'m dyn Fn(&dyn Bonds<D>) -> Box<dyn Response<D> + 'm>;
+pub type Make<'m, const D: usize> = &'m dyn Fn(&dyn Bonds<D>) -> Box<dyn SolverMaterial<D> + 'm>;
 
 /// Bonds, a material at work in them, and where they are.
 struct Case<'a, 'm, const D: usize> {
     name: String,
     bonds: &'a mut dyn Bonds<D>,
-    material: Box<dyn Response<D> + 'm>,
+    material: Box<dyn SolverMaterial<D> + 'm>,
     displacement: Field<D>,
 }
 

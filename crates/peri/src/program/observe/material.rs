@@ -7,9 +7,9 @@ use crate::correction::{bond_factors, surface_factors};
 use crate::critical::{Context, CrackArea, Critical, Crossing, Toughness};
 use crate::error::Error;
 use crate::exact::Plate;
-use crate::material::{BondMaterial, Material, NonlocalSolid, Prestrained, Response, relief};
+use crate::material::{BondMaterial, Material, NonlocalSolid, Prestrained, SolverMaterial, relief};
 use crate::potential::BondPotential;
-use crate::probe::{LineSampler, Solid, StressEvaluator};
+use crate::probe::{AnySolid, LineSampler, StressEvaluator};
 use crate::program::scene::{self, Body, Followed, Inclusions, Scene, SurfaceCorrection, Variant};
 use crate::solver::{Criterion, Loads, State};
 use harness::scene::{SceneError, Source};
@@ -24,12 +24,12 @@ pub enum SceneMaterial<const D: usize> {
     /// A bond law with prestrains.
     Prestrained(Prestrained<D>),
     /// A solid of the mean deformation of a family.
-    Solid(Solid<D>),
+    Solid(AnySolid<D>),
 }
 
 impl<const D: usize> SceneMaterial<D> {
     /// For the solver.
-    pub fn respond(&self, bonds: &dyn Bonds<D>) -> Box<dyn Response<D>> {
+    pub fn respond(&self, bonds: &dyn Bonds<D>) -> Box<dyn SolverMaterial<D>> {
         match self {
             Self::Bonds(bonded) => bonded.clone().respond(bonds),
             Self::Prestrained(prestrained) => prestrained.clone().respond(bonds),

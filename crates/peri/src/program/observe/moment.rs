@@ -5,15 +5,17 @@ use crate::bonds::{Bonds, Fragment, covered_stretches, fragments};
 use crate::error::Error;
 use crate::potential::KernelFit;
 use crate::program::scene::Scene;
-use crate::solver::{Record, State};
-use crate::stress::{self, Loaded, Measure, Measured, Missing, Tensor, cauchy, deformation_gradients};
+use crate::solver::{State, StepRecord};
+use crate::stress::{
+    self, Loaded, MeasuredStress, Missing, StressMeasure, StressTensor, cauchy, deformation_gradients,
+};
 use harness::observe::{Fields, Observer, Scalars};
 use harness::report::Phases;
 use std::cell::{OnceCell, RefCell};
 use std::time::Instant;
 
 /// A stress field of each measure.
-pub type StressFields<const D: usize> = Vec<(Measure, Vec<Tensor<D>>)>;
+pub type StressFields<const D: usize> = Vec<(StressMeasure, Vec<StressTensor<D>>)>;
 
 /// Stresses of a state by every measure that the scene names.
 #[derive(Default)]
@@ -52,7 +54,7 @@ impl<'a, const D: usize> Moment<'a, D> {
     }
 
     /// A number of every row of the history.
-    pub fn each(&self, get: fn(&Record) -> f64) -> impl Iterator<Item = f64> {
+    pub fn each(&self, get: fn(&StepRecord) -> f64) -> impl Iterator<Item = f64> {
         self.state.history.iter().map(get)
     }
 
@@ -87,7 +89,7 @@ impl<'a, const D: usize> Moment<'a, D> {
         self.physics.whole.as_ref().map_or(0.0, |[whole, cracked]| whole.iter().zip(cracked).map(part).sum())
     }
 
-    /// Stresses; the phase of a measure is what it would take alone ([`Measured::seconds`]).
+    /// Stresses; the phase of a measure is what it would take alone ([`MeasuredStress::seconds`]).
     ///
     /// # Errors
     /// As [`KernelFit::new`].
@@ -110,8 +112,8 @@ impl<'a, const D: usize> Moment<'a, D> {
         let Some(material) = evaluator.bond_material() else {
             let found = phases.time("stress constitutive", || evaluator.stress(bonds, state));
             if let Some([piola, cauchy]) = found {
-                stresses.cauchy.push((Measure::Constitutive, cauchy));
-                stresses.piola.extend(keeps.then_some((Measure::Constitutive, piola)));
+                stresses.cauchy.push((StressMeasure::Constitutive, cauchy));
+                stresses.piola.extend(keeps.then_some((StressMeasure::Constitutive, piola)));
             }
             return Ok(stresses);
         };
@@ -122,7 +124,7 @@ impl<'a, const D: usize> Moment<'a, D> {
         let (modulus, missing) = (material.modulus(), Missing::WindowAt(&self.physics.by_window));
         let loaded = Loaded { displacement: &state.displacement, fit: &fit, modulus, missing };
         let measured = stress::piolas(bonds, &loaded, &spec.measures, spec.ball);
-        for (&measure, Measured { piola, seconds }) in spec.measures.iter().zip(measured) {
+        for (&measure, MeasuredStress { piola, seconds }) in spec.measures.iter().zip(measured) {
             let started = Instant::now();
             stresses.cauchy.push((measure, cauchy(&piola, &gradients)));
             let seconds = seconds + started.elapsed().as_secs_f64();

@@ -1,7 +1,7 @@
 //! Numbers, units and distances of pictures.
 
 use super::moment::Moment;
-use crate::solver::{Criterion, Record};
+use crate::solver::{Criterion, StepRecord};
 
 /// Four digits.
 pub fn short(value: f64) -> String {
@@ -27,7 +27,7 @@ pub(super) fn bridge<const D: usize>(m: &Moment<D>) -> f64 {
 }
 
 /// What a moment of a run is called: a load step's displacement and load, or a place within a step.
-pub(super) fn title(history: &[Record], time: f64) -> String {
+pub(super) fn title(history: &[StepRecord], time: f64) -> String {
     let step = time.ceil() as usize;
     let Some(record) = step.checked_sub(1).and_then(|k| history.get(k)) else { return String::new() };
     let place = format!("U = {} mm", short(record.displacement * 1e3));

@@ -18,7 +18,7 @@ use crate::error::Error;
 use crate::program::observe::{self, Frames, Moment, Observers, Physics, in_space};
 use crate::program::quantities as q;
 use crate::program::scene::{self, NAMING, Scene, Variant};
-use crate::solver::{Breaking, Method, Record, State, Status, System, load_stepping};
+use crate::solver::{Breaking, Method, State, Status, StepRecord, System, load_stepping};
 use harness::case::{Fault, Run, Step, StepField};
 use harness::observe::{Outputs, Scalars};
 use harness::report::{Phases, Report};
@@ -299,7 +299,7 @@ fn seen<const D: usize>(bonds: &dyn Bonds<D>, state: &State<D>) -> Step {
         StepField { name, unit: "m", components: 3, data: each.collect() }
     };
     Step {
-        values: Record::SCALARS.map(|(name, unit, get)| (name, unit, get(record))).to_vec(),
+        values: StepRecord::SCALARS.map(|(name, unit, get)| (name, unit, get(record))).to_vec(),
         fields: vec![
             of_particles("position", &|site| bonds.position(site)),
             of_particles("displacement", &|site| state.displacement.get(site)),

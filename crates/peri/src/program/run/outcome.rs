@@ -2,7 +2,7 @@
 
 use crate::bonds::{Bonds, Fragment};
 use crate::program::scene::Variant;
-use crate::solver::{Event, Record, State};
+use crate::solver::{BreakingEvent, State, StepRecord};
 use harness::observe::Curve;
 use harness::report::{Named, Phases};
 use harness::study::Solved;
@@ -24,9 +24,9 @@ pub struct Outcome {
     /// Named profiles.
     pub profiles: Vec<Profile>,
     /// The load steps.
-    pub history: Vec<Record>,
+    pub history: Vec<StepRecord>,
     /// Bonds that broke together, in their order.
-    pub events: Vec<Event>,
+    pub events: Vec<BreakingEvent>,
     /// The fragments, the largest first.
     pub fragments: Vec<Fragment>,
     /// Whether the load was lowered where bonds broke, see `solver.snap_back`.

@@ -5,7 +5,7 @@ use super::region::region;
 use super::values::Body;
 use super::{Boundary, ContactSpec, Method, Prescribed, PrescribedField, Scene, Side};
 use crate::field::Field;
-use crate::material::{Tensor, surface_load};
+use crate::material::{BodyTensor, surface_load};
 use crate::solver::{Adrift, INVERTS, Loads, Stops, Support, adrift, inverted};
 use harness::scene::{SceneError, Source};
 
@@ -75,7 +75,7 @@ fn add_traction<const D: usize>(
     let bounds = [body.bounds.0[axis], body.bounds.1[axis]];
     let reach = (2.0 * body.bonds.horizon()).min(0.5 * (bounds[1] - bounds[0]));
     let sign = if upper { 1.0 } else { -1.0 };
-    let stress = Tensor::from_fn(|a, b| if b == axis { sign * traction[a] } else { 0.0 });
+    let stress = BodyTensor::from_fn(|a, b| if b == axis { sign * traction[a] } else { 0.0 });
     let surface = surface_load(&*body.bonds, stress);
     let field = loads.body_force.get_or_insert_with(|| Field::zeros(body.bonds.sites()));
     for &site in body.bonds.particles() {

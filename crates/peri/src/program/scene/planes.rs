@@ -2,7 +2,7 @@
 
 use super::values::Body;
 use super::{Method, Scene};
-use crate::contact::Plane;
+use crate::contact::RigidPlane;
 use harness::scene::{SceneError, Source};
 use polycore::numerics::range;
 
@@ -20,7 +20,7 @@ const LOOKS: u32 = 100;
 /// A plane of a scene with a unit normal, and the range of the body's particles along it, m.
 struct StretchScan<const D: usize> {
     name: String,
-    plane: Plane<D>,
+    plane: RigidPlane<D>,
     low: f64,
     high: f64,
     /// Height of the lowest point of the surface, m.
@@ -30,7 +30,7 @@ struct StretchScan<const D: usize> {
 impl<const D: usize> StretchScan<D> {
     /// Height of the plane over its place at rest along its normal, m, at a load factor and a time, s.
     fn raised(&self, factor: f64, time: f64) -> f64 {
-        let Plane { normal, displacement, velocity, .. } = self.plane;
+        let RigidPlane { normal, displacement, velocity, .. } = self.plane;
         (0..D).map(|d| normal[d] * (factor * displacement[d] + time * velocity[d])).sum()
     }
 }

@@ -6,8 +6,8 @@ use super::values::{plain, positive};
 use crate::bonds::VolumeCorrection;
 use crate::calibrate::{Calibration, Space};
 use crate::error::Error;
-use crate::material::{Correspondence, EightChain, PointLaw};
-use crate::stress::Measure;
+use crate::material::{Correspondence, EightChainSolid, PointLaw};
+use crate::stress::StressMeasure;
 use harness::scene::{ConstitutiveSpec, SceneError, Source};
 use polycore::constitutive::surrogate::Kind;
 use polycore::units::Stress;
@@ -120,7 +120,7 @@ impl SolidLaw {
                     ));
                 }
             };
-            let network = EightChain::new(space, shear.si(), links, bulk).map_err(wrong)?;
+            let network = EightChainSolid::new(space, shear.si(), links, bulk).map_err(wrong)?;
             let volumetric = space != Space::PlaneStress && planes;
             let stiff = volumetric && bulk >= FILTERED * shear.si();
             if !self.pressure_filter.unwrap_or(stiff) {
@@ -204,8 +204,11 @@ pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<
         let allowed = "false: points of a cloud have no nearest neighbours";
         return Err(source.error(&format!("{KEY}.pressure_filter"), "true", allowed));
     }
-    let other =
-        scene.stress.iter().flat_map(|stress| &stress.measures).position(|&m| m != Measure::Constitutive);
+    let other = scene
+        .stress
+        .iter()
+        .flat_map(|stress| &stress.measures)
+        .position(|&m| m != StressMeasure::Constitutive);
     if let Some(index) = other {
         let allowed = "`constitutive`, the stress of the law itself";
         return Err(source.error(&format!("stress.measures[{index}]"), "a measure of bond forces", allowed));

@@ -2,7 +2,7 @@
 //! V_I ∇φ_a : C_I : ∇φ_b, C_I = Σ_J kθ w V_J/|ξ| T ⊗ ξ ⊗ ξ, with T = t′ m⊗m + (t/λ)(1 − m⊗m) the tangent of a
 //! bond of direction m: the Hessian of the bonds' energy for functions linear within a horizon.
 
-use super::space::{CORNERS, Element, Space};
+use super::space::{CORNERS, CoarseElement, CoarseSpace};
 use crate::bonds::{BodyGeometry, Bonds};
 use crate::field::Field;
 use crate::potential::BondPotential;
@@ -29,7 +29,7 @@ const SMALL: f64 = 0.1;
 type Tangent = [[f64; SYMMETRIC]; SYMMETRIC];
 
 /// Σ V ∂φ_a ∂φ_b for each pair of corners a ≤ b, mixed pairs of derivatives both ways.
-type Products = [[f64; SYMMETRIC]; PAIRS];
+type GradientProducts = [[f64; SYMMETRIC]; PAIRS];
 
 /// Element stiffness: for each pair of corners a ≤ b, the matrix of components (i of a, j of b) at iD + j.
 pub type ElementMatrix = [[f64; 9]; PAIRS];
@@ -115,7 +115,7 @@ pub struct Assembly<'a, const D: usize> {
     interior: Option<Tangent>,
     /// Volume of a cell (2D: times the thickness), m³, and Σ V ∂φ_a ∂φ_b over all of it.
     cell: f64,
-    full: Products,
+    full: GradientProducts,
     /// λ of the volume in excess of that of bonds, Pa.
     volumetric: f64,
 }
@@ -137,7 +137,7 @@ impl<'a, const D: usize> Assembly<'a, D> {
         let thickness = volumes / bonds.particles().len().max(1) as f64 / bonds.spacing().powi(D as i32);
         let cell = thickness * edge.iter().product::<f64>();
         // Gauss' two points along each axis are exact
-        let mut full: Products = [[0.0; SYMMETRIC]; PAIRS];
+        let mut full: GradientProducts = [[0.0; SYMMETRIC]; PAIRS];
         for point in 0..1 << D {
             let local = std::array::from_fn(|d| 0.5 + [-0.5, 0.5][point >> d & 1] / 3.0_f64.sqrt());
             let (_, slopes) = hats::<D>(local, edge);
@@ -225,7 +225,11 @@ impl<'a, const D: usize> Assembly<'a, D> {
     }
 
     /// Computes the stiffness of an element, and for each corner Σ V φ over its particles.
-    pub fn element(&self, space: &Space<D>, element: &Element) -> (ElementMatrix, [f64; CORNERS]) {
+    pub fn element(
+        &self,
+        space: &CoarseSpace<D>,
+        element: &CoarseElement,
+    ) -> (ElementMatrix, [f64; CORNERS]) {
         let corners = 1 << D;
         let mut matrix = [[0.0; 9]; PAIRS];
         let mut measure = [0.0; CORNERS];
@@ -300,7 +304,7 @@ impl<'a, const D: usize> Assembly<'a, D> {
 }
 
 /// matrix += C : products, corner pair by corner pair.
-fn contract<const D: usize>(matrix: &mut ElementMatrix, tangent: &Tangent, products: &Products) {
+fn contract<const D: usize>(matrix: &mut ElementMatrix, tangent: &Tangent, products: &GradientProducts) {
     let pairs = D * (D + 1) / 2;
     let corners = 1 << D;
     for (result, products) in matrix.iter_mut().zip(products).take(corners * (corners + 1) / 2) {
@@ -345,7 +349,7 @@ fn add_tangent(sum: &mut Tangent, tangent: &Tangent, volume: f64) {
 }
 
 /// products += V ∂φ_a ∂φ_b for each pair of corners a ≤ b; mixed pairs of derivatives both ways.
-fn add_products<const D: usize>(products: &mut Products, volume: f64, slopes: &[[f64; D]; CORNERS]) {
+fn add_products<const D: usize>(products: &mut GradientProducts, volume: f64, slopes: &[[f64; D]; CORNERS]) {
     let mut at = 0;
     for a in 0..1 << D {
         for b in a..1 << D {
