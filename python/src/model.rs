@@ -14,7 +14,7 @@ use peri::geometry::{Cut, Shape};
 use peri::material::BondMaterial;
 use peri::model::{self, Body, Model, Rubber};
 use peri::potential::Law;
-use peri::solver::{DynamicRelaxation, Lbfgs, StepRecord, State, Status, Support, VelocityVerlet};
+use peri::solver::{DynamicRelaxation, Lbfgs, State, Status, StepRecord, Support, VelocityVerlet};
 use peri::stress::{self, StressMeasure, StressTensor};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -318,7 +318,7 @@ where
     let body = body.placed(&spec.space, spec.thickness)?;
     let calibration = if spec.lattice_calibration { Calibration::Lattice } else { Calibration::Continuum };
     let rubber = match (sampled, named) {
-        (Some(law), _) => Rubber::of_law(law, spec.youngs_modulus),
+        (Some(law), _) => Rubber::with_law(law, spec.youngs_modulus),
         (None, name) => {
             let name = name.unwrap_or_default();
             let law = Law::ALL.into_iter().find(|law| law.name() == name).ok_or_else(|| {

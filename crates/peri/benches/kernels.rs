@@ -4,7 +4,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use peri::bonds::{BodyGeometry, BondDamage, CloudBonds, VolumeCorrection, force};
 use peri::field::Field;
 use peri::potential::{KernelFit, Law};
-use peri::stress::{BallVolume, Loaded, Missing, StressMeasure, piola_in_cloud};
+use peri::stress::{BallVolume, StressInput, StressMeasure, SurfaceCompensation, piola_in_cloud};
 
 mod kernel;
 
@@ -64,7 +64,12 @@ fn stress(criterion: &mut Criterion) {
     let fit = fit.unwrap_or_else(|error| panic!("{error}"));
     let mut group = criterion.benchmark_group("stress of a cloud");
     for measure in [StressMeasure::Hardy, StressMeasure::Gaussian] {
-        let state = Loaded { displacement: &displacement, fit: &fit, modulus: 1.0, missing: Missing::Bonds };
+        let state = StressInput {
+            displacement: &displacement,
+            fit: &fit,
+            modulus: 1.0,
+            missing: SurfaceCompensation::Bonds,
+        };
         group.bench_function(measure.name(), |bencher| {
             bencher.iter(|| piola_in_cloud(&bonds, &state, measure, BallVolume::Particles));
         });

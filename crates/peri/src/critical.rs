@@ -164,7 +164,7 @@ pub const ONE_OF: &str = "exactly one of `percent_over_contour`, `stretch`, `fra
 
 impl Critical {
     /// Names of the alternatives given.
-    pub fn given(&self) -> Vec<&'static str> {
+    pub fn alternatives(&self) -> Vec<&'static str> {
         let all = [
             ("percent_over_contour", self.percent_over_contour.is_some()),
             ("stretch", self.stretch.is_some()),
@@ -179,7 +179,7 @@ impl Critical {
     /// # Errors
     /// [`Error::Parameter`] for a strength that the law does not reach or that is too large for the fracture
     /// energy.
-    pub fn of_solid<const D: usize>(
+    pub fn solid_criterion<const D: usize>(
         &self,
         law: &dyn PointLaw<D>,
         bonds: &dyn BodyGeometry<D>,
@@ -247,7 +247,7 @@ impl Critical {
             (None, None, Some(energy)) => {
                 stretch_of_energy(context, self.convention.unwrap_or(context.convention), energy.si())
             }
-            _ => fault("critical (number of alternatives)", self.given().len() as f64, ONE_OF),
+            _ => fault("critical (number of alternatives)", self.alternatives().len() as f64, ONE_OF),
         }
     }
 }

@@ -14,9 +14,9 @@ use crate::material::{BondMaterial, Material, NonlocalSolid, PointLaw};
 use crate::potential::KernelFit;
 use crate::probe::StressEvaluator;
 use crate::solver::{
-    Breaking, Loads, Method, Policy, StepRecord, Rotation, State, Status, Support, System, Turned,
+    Breaking, Loads, Method, Policy, RotatingRegion, Rotation, State, Status, StepRecord, Support, System,
 };
-use crate::stress::{self, BallVolume, Loaded, Missing, StressMeasure, StressTensor};
+use crate::stress::{self, BallVolume, StressInput, StressMeasure, StressTensor, SurfaceCompensation};
 use std::sync::Arc;
 
 /// A material of a body: a [`Material`], or a description that becomes one in a body, such as [`Rubber`].
@@ -169,7 +169,7 @@ impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
         for (number, rotation) in self.rotations {
             let region = regions[..number].iter().filter(|(_, support)| holds(support)).count();
             let (shift, components, sites) = ([0.0; D], (1 << D) - 1, regions[number].0.clone());
-            loads.turn(&bonds, Turned { rotation, shift, components, region, sites });
+            loads.turn(&bonds, RotatingRegion { rotation, shift, components, region, sites });
         }
         let modulus = material.longitudinal_modulus(&bonds);
         let contact = match (self.contact, self.planes.is_empty()) {
@@ -267,7 +267,7 @@ impl<const D: usize, M: Material<D> + Clone> Simulation<D, M> {
 impl<const D: usize> Simulation<D, BondMaterial<'static>> {
     /// Creates an evaluator of bond forces, see [`crate::probe`].
     pub fn evaluator(&self) -> StressEvaluator<D> {
-        StressEvaluator::of_bonds(self.material.clone(), 1e-9, self.breaking.is_some())
+        StressEvaluator::for_bonds(self.material.clone(), 1e-9, self.breaking.is_some())
     }
 }
 
@@ -275,7 +275,7 @@ impl<const D: usize, L: PointLaw<D> + Clone + 'static> Simulation<D, NonlocalSol
     /// Creates an evaluator of forces, stresses and energy-momentum, see [`crate::probe`]; create it before
     /// bonds break.
     pub fn evaluator(&self) -> StressEvaluator<D> {
-        StressEvaluator::of_solid(Arc::new(self.material.0.clone()), false, &self.bonds)
+        StressEvaluator::for_solid(Arc::new(self.material.0.clone()), false, &self.bonds)
     }
 }
 
@@ -287,8 +287,8 @@ impl<const D: usize> Simulation<D, BondMaterial<'_>> {
     pub fn piola(&self, measure: StressMeasure) -> Result<Vec<StressTensor<D>>, Error> {
         let displacement = &self.state.displacement;
         let fit = KernelFit::new(self.material.law(), covered_stretches(&self.bonds, displacement), 1e-9)?;
-        let (modulus, missing) = (self.material.modulus(), Missing::WindowAt(&self.loaded));
-        let loaded = Loaded { displacement, fit: &fit, modulus, missing };
+        let (modulus, missing) = (self.material.modulus(), SurfaceCompensation::WindowAt(&self.loaded));
+        let loaded = StressInput { displacement, fit: &fit, modulus, missing };
         Ok(stress::piola(&self.bonds, &loaded, measure, BallVolume::default()))
     }
 

@@ -191,7 +191,7 @@ impl<const D: usize> BodySurface<D> {
                 self.flat(shape, axis, ends, outward, columns);
                 let patch = self.patch(Patch::Round { centre, radius, axis: Some(axis), outward });
                 let count = around(TAU * radius, columns.spacing);
-                for layer in (0..columns.counts[axis]).map(|k| columns.at(axis, k)) {
+                for layer in (0..columns.counts[axis]).map(|k| columns.coordinate(axis, k)) {
                     if layer <= ends.0 || layer >= ends.1 {
                         continue;
                     }
@@ -243,7 +243,7 @@ impl<const D: usize> BodySurface<D> {
                     }
                     let cell = rest % columns.counts[d];
                     rest /= columns.counts[d];
-                    columns.at(d, cell)
+                    columns.coordinate(d, cell)
                 });
                 if shape.contains(place) {
                     place[axis] = end;
@@ -263,7 +263,7 @@ struct CellColumns<const D: usize> {
 }
 
 impl<const D: usize> CellColumns<D> {
-    fn at(&self, axis: usize, cell: usize) -> f64 {
+    fn coordinate(&self, axis: usize, cell: usize) -> f64 {
         self.origin[axis] + self.spacing * cell as f64
     }
 }

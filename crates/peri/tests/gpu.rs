@@ -70,7 +70,7 @@ fn compare_forces<const D: usize>(device: &Device, cells: [usize; D]) {
     let mut bonds = damaged(cells);
     let u = random(&bonds, 0.05);
     let all = bonds.directed_bonds();
-    bonds.sever(&overstretched(&bonds, &u, &1.05.into(), &peri::bonds::StretchScan::default()));
+    bonds.break_bonds(&overstretched(&bonds, &u, &1.05.into(), &peri::bonds::StretchScan::default()));
     assert!(bonds.directed_bonds() < all);
     let range = stretch_range(&bonds, &u);
     let range = [range.low, range.high].map(|e| (1.0 + e).sqrt()).map(|l| l + 1e-3 * (l - 1.0).signum());

@@ -178,7 +178,7 @@ impl<const D: usize> CloudBonds<D> {
     }
 
     /// Returns the range of sites that bonds of `sites` reach.
-    fn met_by(&self, sites: Range<usize>) -> Range<usize> {
+    fn reached_by(&self, sites: Range<usize>) -> Range<usize> {
         let met = &self.lists.neighbours[self.lists.starts[sites.start]..self.lists.starts[sites.end]];
         let first = met.iter().min().map_or(sites.start, |&first| sites.start.min(first as usize));
         let last = met.iter().max().map_or(sites.end, |&last| sites.end.max(last as usize + 1));
@@ -203,7 +203,7 @@ impl<const D: usize> CloudBonds<D> {
 }
 
 /// Applies softening to an intact bond.
-fn weakened<const D: usize>(bond: Neighbour<D>, soft: &[Softened]) -> Neighbour<D> {
+fn with_softening<const D: usize>(bond: Neighbour<D>, soft: &[Softened]) -> Neighbour<D> {
     let part = integrity(soft, bond.index);
     Neighbour { volume: part * bond.volume, weight: part * bond.weight, ..bond }
 }
@@ -237,13 +237,13 @@ impl<const D: usize> BodyGeometry<D> for CloudBonds<D> {
         let soft = self.softening.among(site..site + 1);
         for k in self.lists.row(site) {
             if self.lists.neighbours[k] as usize != site {
-                visit(weakened(self.whole(site, k), soft));
+                visit(with_softening(self.whole(site, k), soft));
             }
         }
     }
 
     fn bond(&self, site: usize, index: u32) -> Neighbour<D> {
-        weakened(self.whole_bond(site, index), self.softening.among(site..site + 1))
+        with_softening(self.whole_bond(site, index), self.softening.among(site..site + 1))
     }
 
     fn bonded(&self, site: usize) -> u32 {
@@ -307,13 +307,13 @@ impl<const D: usize> BondForces<D> for CloudBonds<D> {
                 own = ParticleRows::new(
                     &self.position,
                     displacement,
-                    self.met_by(start..start + force[0].len()),
+                    self.reached_by(start..start + force[0].len()),
                 );
                 &own
             } else {
-                assert!(self.law.rows.are_of::<D>(self.volumes.len()));
+                assert!(self.law.rows.has_particles::<D>(self.volumes.len()));
                 debug_assert!(
-                    self.law.rows.holds(displacement, start..start + force[0].len()),
+                    self.law.rows.matches(displacement, start..start + force[0].len()),
                     "of another displacement"
                 );
                 &self.law.rows
@@ -357,9 +357,9 @@ impl<const D: usize> BondForces<D> for CloudBonds<D> {
 }
 
 impl<const D: usize> BondDamage<D> for CloudBonds<D> {
-    fn sever(&mut self, bonds: &[Overstretched]) {
+    fn break_bonds(&mut self, bonds: &[Overstretched]) {
         for bond in bonds {
-            self.lists.sever(bond.site, self.lists.starts[bond.site as usize] + bond.index as usize);
+            self.lists.break_bond(bond.site, self.lists.starts[bond.site as usize] + bond.index as usize);
         }
     }
 
@@ -390,7 +390,7 @@ impl<const D: usize> BondDamage<D> for CloudBonds<D> {
         for site in 0..self.volumes.len() {
             for k in self.lists.row(site) {
                 if self.lists.inverse_length[k] > 0.0 && words[k / 64] >> (k % 64) & 1 == 0 {
-                    self.lists.sever(site as u32, k);
+                    self.lists.break_bond(site as u32, k);
                 }
             }
         }

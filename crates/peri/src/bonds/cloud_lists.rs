@@ -90,7 +90,7 @@ impl NeighbourLists {
     }
 
     /// Severs bond `k` of a site: like padding, it becomes a bond of zero stiffness to the site itself.
-    pub(super) fn sever(&mut self, site: u32, k: usize) {
+    pub(super) fn break_bond(&mut self, site: u32, k: usize) {
         self.neighbours[k] = site;
         self.inverse_length[k] = 0.0;
         self.directed_bonds -= 1;

@@ -66,7 +66,7 @@ pub fn law<T: KernelReal, S: Simd, const P: usize, const Q: usize>(
         for k in (0..Q - 1).rev() {
             d = T::mul_add(simd, d, e, T::splat(simd, denominator[k]));
         }
-        d = T::mul_add(simd, d, e, T::splat(simd, T::of(1.0)));
+        d = T::mul_add(simd, d, e, T::splat(simd, T::from_f64(1.0)));
         n = T::div(simd, n, d);
     }
     T::mul_add(simd, n, e, T::splat(simd, constant))

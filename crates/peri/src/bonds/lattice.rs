@@ -395,7 +395,7 @@ impl<const D: usize> BondForces<D> for LatticeBonds<D> {
 
     fn prepare(&mut self, displacement: &Field<D>) {
         if let Some(mixed) = &mut self.mixed {
-            mixed.round(displacement, self.lattice.spacing);
+            mixed.set_displacement(displacement, self.lattice.spacing);
         }
     }
 
@@ -442,7 +442,7 @@ impl<const D: usize> BondForces<D> for LatticeBonds<D> {
 }
 
 impl<const D: usize> BondDamage<D> for LatticeBonds<D> {
-    fn sever(&mut self, bonds: &[Overstretched]) {
+    fn break_bonds(&mut self, bonds: &[Overstretched]) {
         for bond in bonds {
             let (site, k) = (bond.site as usize, bond.index as usize);
             self.intact[k / 64][site] &= !(1 << (k % 64));

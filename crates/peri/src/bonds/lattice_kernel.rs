@@ -69,7 +69,7 @@ impl<'a, const D: usize, T> Factors<'a, D, T> {
         if even { Self::Even(components[0]) } else { Self::Along(components) }
     }
 
-    fn are_of(&self, sites: usize) -> bool {
+    fn cover(&self, sites: usize) -> bool {
         match self {
             Self::Even(factors) => factors.len() == sites,
             Self::Along(factors) => factors.iter().all(|component| component.len() == sites),
@@ -110,10 +110,10 @@ impl<T: KernelReal, const D: usize, const P: usize, const Q: usize> ForceKernel<
             self.tiles.intact.iter().all(|w| w.len() == sites)
                 && self.tiles.intact.len() * 64 >= self.rows.len()
         );
-        assert!(self.tiles.factors.is_none_or(|factors| factors.are_of(sites)));
+        assert!(self.tiles.factors.is_none_or(|factors| factors.cover(sites)));
         assert!(self.rows.iter().all(|r| r.shift.unsigned_abs() <= self.tiles.guard));
         let tracking = track.is_some();
-        let mut seen = [T::splat(simd, T::of(0.0)); 2];
+        let mut seen = [T::splat(simd, T::from_f64(0.0)); 2];
         for offset in (0..length).step_by(TILE) {
             let base = start + offset;
             let class = self.tiles.classes[base / TILE];
@@ -187,8 +187,8 @@ impl<T: KernelReal, const D: usize, const P: usize, const Q: usize> LatticePass<
         let [mut low, mut high] = *seen;
         let displacement = self.tiles.displacement;
         // SAFETY: as above
-        let own = unsafe { self.own::<S, V>(simd, base) };
-        let mut sum = [[T::splat(simd, T::of(0.0)); V]; D];
+        let own = unsafe { self.displacements::<S, V>(simd, base) };
+        let mut sum = [[T::splat(simd, T::from_f64(0.0)); V]; D];
         for rows in tracked.chunks(T::RUN) {
             for row in rows {
                 let inverse = T::splat(simd, row.inverse_square);
@@ -247,8 +247,8 @@ impl<T: KernelReal, const D: usize, const P: usize, const Q: usize> LatticePass<
         let tracked = self.tracked(tracking);
         let displacement = self.tiles.displacement;
         // SAFETY: as above
-        let own = unsafe { self.own::<S, V>(simd, base) };
-        let zero = T::splat(simd, T::of(0.0));
+        let own = unsafe { self.displacements::<S, V>(simd, base) };
+        let zero = T::splat(simd, T::from_f64(0.0));
         let mut sum = [[zero; V]; D];
         for (word, rows) in self.rows.chunks(64).enumerate() {
             let words = &self.tiles.intact[word][base..base + V * lanes];
@@ -353,7 +353,7 @@ impl<T: KernelReal, const D: usize, const P: usize, const Q: usize> LatticePass<
                 for v in 0..V {
                     // SAFETY: as above
                     unsafe { T::add_to(simd, out[d].add(v * T::lanes::<S>()), self.unit, sum[d][v]) };
-                    sum[d][v] = T::splat(simd, T::of(0.0));
+                    sum[d][v] = T::splat(simd, T::from_f64(0.0));
                 }
             }
         }
@@ -365,8 +365,8 @@ impl<T: KernelReal, const D: usize, const P: usize, const Q: usize> LatticePass<
     /// # Safety
     /// As [`Self::full`].
     #[inline(always)]
-    unsafe fn own<S: Simd, const V: usize>(&self, simd: S, base: usize) -> [[T::Vector<S>; D]; V] {
-        let mut own = [[T::splat(simd, T::of(0.0)); D]; V];
+    unsafe fn displacements<S: Simd, const V: usize>(&self, simd: S, base: usize) -> [[T::Vector<S>; D]; V] {
+        let mut own = [[T::splat(simd, T::from_f64(0.0)); D]; V];
         for v in 0..V {
             for d in 0..D {
                 // SAFETY: as above
@@ -390,7 +390,7 @@ impl<T: KernelReal, const D: usize, const P: usize, const Q: usize> StencilRow<T
         own: &[T::Vector<S>; D],
         here: usize,
     ) -> ([T::Vector<S>; D], T::Vector<S>) {
-        let zero = T::splat(simd, T::of(0.0));
+        let zero = T::splat(simd, T::from_f64(0.0));
         let there = here.wrapping_add_signed(self.shift);
         let (mut e, mut zeta) = (zero, [zero; D]);
         for d in 0..D {
@@ -448,13 +448,13 @@ impl<T: KernelReal, const D: usize, const P: usize, const Q: usize> StencilRow<T
             Factors::Even(factors) => {
                 // SAFETY: as above
                 let pair = unsafe { T::add(simd, T::load::<S>(factors, here), T::load::<S>(factors, there)) };
-                return T::mul(simd, pair, T::splat(simd, T::of(0.5)));
+                return T::mul(simd, pair, T::splat(simd, T::from_f64(0.5)));
             }
             Factors::Along(factors) => factors,
         };
-        let four = T::splat(simd, T::of(4.0));
+        let four = T::splat(simd, T::from_f64(4.0));
         let inverse = T::mul(simd, four, T::splat(simd, self.inverse_square));
-        let mut sum = T::splat(simd, T::of(0.0));
+        let mut sum = T::splat(simd, T::from_f64(0.0));
         for d in 0..D {
             let bond = T::splat(simd, self.bond[d]);
             // 4/(g_I + g_J)² = 1/ḡ²
@@ -464,6 +464,6 @@ impl<T: KernelReal, const D: usize, const P: usize, const Q: usize> StencilRow<T
             let cosine = T::mul(simd, T::mul(simd, bond, bond), inverse);
             sum = T::add(simd, sum, T::div(simd, cosine, T::mul(simd, pair, pair)));
         }
-        T::div(simd, T::splat(simd, T::of(1.0)), T::sqrt(simd, sum))
+        T::div(simd, T::splat(simd, T::from_f64(1.0)), T::sqrt(simd, sum))
     }
 }

@@ -98,7 +98,7 @@ impl<const D: usize> Spans<'_, D> {
     /// Lists the bonds beyond e = `least` that begin in these sites, of one direction each: by site and bond
     /// of the stencil, from both ends.
     pub fn beyond(&self, sites: Range<usize>, least: f64) -> Vec<[u32; 2]> {
-        let mut found = Beyond { least, bonds: Vec::new() };
+        let mut found = BeyondScan { least, bonds: Vec::new() };
         self.sum(sites, self.spans.len() / 2, &mut found);
         found.bonds
     }
@@ -172,12 +172,12 @@ impl<const D: usize> Add<D> for Extremes {
     }
 }
 
-struct Beyond {
+struct BeyondScan {
     least: f64,
     bonds: Vec<[u32; 2]>,
 }
 
-impl<const D: usize> Add<D> for Beyond {
+impl<const D: usize> Add<D> for BeyondScan {
     #[inline(always)]
     fn tile(&mut self, spans: &Spans<D>, base: usize, present: &[usize]) {
         for &k in present {

@@ -184,7 +184,7 @@ mod tests {
             let mut index = None;
             bonds.neighbours(site as usize, &mut |bond| index = index.or(Some(bond.index)));
             let index = index.unwrap();
-            bonds.sever(&[Overstretched { site, index, elongation: 0.0, length: 1.0, weight: 1.0 }]);
+            bonds.break_bonds(&[Overstretched { site, index, elongation: 0.0, length: 1.0, weight: 1.0 }]);
             assert_eq!(bonds.one_sided().map(|pair| pair[1]), Some(site as usize));
             assert!(refuse_one_sided(bonds).unwrap_err().to_string().contains("no counterpart"));
         }

@@ -11,7 +11,7 @@ pub trait KernelReal: Copy + Send + Sync + 'static {
     /// Number of lanes of a vector.
     fn lanes<S: Simd>() -> usize;
     /// Rounds to the nearest number.
-    fn of(value: f64) -> Self;
+    fn from_f64(value: f64) -> Self;
     /// Fills all lanes with a number.
     fn splat<S: Simd>(simd: S, value: Self) -> Self::Vector<S>;
     /// a + b.
@@ -68,7 +68,7 @@ macro_rules! real {
                 S::$lanes
             }
             #[inline(always)]
-            fn of(value: f64) -> Self {
+            fn from_f64(value: f64) -> Self {
                 value as $real
             }
             #[inline(always)]

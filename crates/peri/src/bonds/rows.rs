@@ -141,7 +141,7 @@ pub fn scaled_laws<const D: usize>(fit: &KernelFit, stencil: &[StencilBond<D>]) 
 }
 
 fn padded<T: KernelReal, const N: usize>(values: &[f64]) -> [T; N] {
-    std::array::from_fn(|k| T::of(values.get(k).copied().unwrap_or(0.0)))
+    std::array::from_fn(|k| T::from_f64(values.get(k).copied().unwrap_or(0.0)))
 }
 
 /// Compiled sizes (numerator, denominator); a fit is padded with zeros to the first that holds it.
@@ -253,10 +253,10 @@ fn lattice_rows<T: KernelReal, const D: usize, const P: usize, const Q: usize>(
         let scaled = law.scaled(bond);
         StencilRow {
             shift: bond.shift,
-            bond: bond.bond.map(T::of),
-            inverse_square: T::of(scaled.inverse_square),
-            clamp: scaled.clamp.map(T::of),
-            constant: T::of(scaled.constant),
+            bond: bond.bond.map(T::from_f64),
+            inverse_square: T::from_f64(scaled.inverse_square),
+            clamp: scaled.clamp.map(T::from_f64),
+            constant: T::from_f64(scaled.constant),
             numerator: padded(&scaled.numerator),
             denominator: padded(&scaled.denominator),
         }

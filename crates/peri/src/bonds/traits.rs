@@ -153,7 +153,7 @@ pub trait BondForces<const D: usize>: BodyGeometry<D> {
 /// Damage of bonds.
 pub trait BondDamage<const D: usize>: BodyGeometry<D> {
     /// Severs bonds, each given from both ends.
-    fn sever(&mut self, bonds: &[Overstretched]);
+    fn break_bonds(&mut self, bonds: &[Overstretched]);
     /// Damaged bonds (integrity below 1).
     fn softening(&self) -> &SoftenedBonds;
     /// Replaces the softened bonds, each given from both ends: [`BodyGeometry::neighbours`] weighs them by

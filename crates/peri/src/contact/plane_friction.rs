@@ -1,6 +1,6 @@
 //! Friction of faces and particles on rigid planes.
 
-use super::grip::{ContactPair, Grip};
+use super::friction_pair::{ContactPair, FrictionPair};
 use super::planes::Planes;
 use crate::field::Field;
 
@@ -22,7 +22,7 @@ impl<const D: usize> Planes<D> {
     }
 
     /// Computes the friction forces of explicit dynamics from elastic slips.
-    pub fn drag(&mut self, held: &[Grip]) {
+    pub fn drag(&mut self, held: &[FrictionPair]) {
         let mut drags = std::mem::take(&mut self.drags);
         drags.clear();
         for grip in held {
@@ -45,7 +45,7 @@ impl<const D: usize> Planes<D> {
     /// Computes the friction of all contacts at a displacement, with the normal forces there; the slips of
     /// `old`, sorted by pair, continue. Contacts that began after `start` slip for their part of the way
     /// only.
-    pub fn grips(&self, field: &Field<D>, start: &Field<D>, old: &[Grip]) -> Vec<Grip> {
+    pub fn grips(&self, field: &Field<D>, start: &Field<D>, old: &[FrictionPair]) -> Vec<FrictionPair> {
         let mut grips = Vec::new();
         for (number, placed) in self.each.iter().enumerate() {
             let plane = &placed.plane;
@@ -69,8 +69,8 @@ impl<const D: usize> Planes<D> {
                 };
                 let share = if then >= 0.0 { 1.0 } else { touch.overlap / (touch.overlap - then) };
                 let slip = known.map_or([0.0; 3], |grip| grip.slip);
-                let mut grip = Grip { pair, slip, bound, stiffness, normal, share };
-                grip.fit();
+                let mut grip = FrictionPair { pair, slip, bound, stiffness, normal, share };
+                grip.project();
                 if bound > 0.0 {
                     grips.push(grip);
                 }

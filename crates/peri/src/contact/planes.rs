@@ -1,7 +1,7 @@
 //! Contact of faces and particles with rigid planes.
 
 use super::faces::Faces;
-use super::grip::{ContactPair, Grip};
+use super::friction_pair::{ContactPair, FrictionPair};
 use super::plane::{PlaneReaction, RigidPlane};
 use crate::bonds::{BodyGeometry, Bonds, Property};
 use crate::error::Error;
@@ -27,7 +27,7 @@ pub(super) struct MovingPlane<const D: usize> {
 
 /// A face, or a particle exposed to planes, beside a plane.
 #[derive(Clone, Copy)]
-pub(super) struct Touch<const D: usize> {
+pub(super) struct PlaneContact<const D: usize> {
     /// Number of a face, or number of faces plus the number of a bare particle.
     pub(super) element: usize,
     /// Position, m; of a particle, on its surface.
@@ -41,7 +41,7 @@ pub(super) struct Touch<const D: usize> {
     pub(super) stiffness: f64,
 }
 
-impl<const D: usize> Touch<D> {
+impl<const D: usize> PlaneContact<D> {
     /// Energy, J.
     fn energy(&self) -> f64 {
         let square = self.offset.map_or(self.overlap * self.overlap, |x| x.iter().map(|x| x * x).sum());
@@ -129,7 +129,7 @@ impl<const D: usize> Planes<D> {
             bonded,
             radii,
             volumes,
-            penalty: Property::new(bonds, |site, _| modulus.at(site) / spacing),
+            penalty: Property::new(bonds, |site, _| modulus.value_at(site) / spacing),
             spacing,
             pushes: Vec::new(),
             drags: Vec::new(),
@@ -149,7 +149,7 @@ impl<const D: usize> Planes<D> {
     }
 
     /// Moves planes to their positions at a load factor and a time, s.
-    pub fn place(&mut self, factor: f64, time: f64) {
+    pub fn move_to(&mut self, factor: f64, time: f64) {
         for placed in &mut self.each {
             let RigidPlane { displacement, velocity, .. } = placed.plane;
             placed.before = placed.now;
@@ -164,7 +164,7 @@ impl<const D: usize> Planes<D> {
 
     /// Exposes the particles among `sites` that have lost bonds: they touch planes themselves, and faces
     /// above them no longer do.
-    pub fn lose(&mut self, bonds: &dyn BodyGeometry<D>, sites: impl Iterator<Item = usize>) {
+    pub fn expose(&mut self, bonds: &dyn BodyGeometry<D>, sites: impl Iterator<Item = usize>) {
         let before = self.bare.len();
         for site in sites.filter(|&site| bonds.bonded(site) < self.bonded[site]) {
             self.bare.push(site as u32);
@@ -204,7 +204,12 @@ impl<const D: usize> Planes<D> {
     }
 
     /// Computes the state of an element beside a plane, whatever its overlap.
-    pub(super) fn beside(&self, placed: &MovingPlane<D>, field: &Field<D>, element: usize) -> Touch<D> {
+    pub(super) fn beside(
+        &self,
+        placed: &MovingPlane<D>,
+        field: &Field<D>,
+        element: usize,
+    ) -> PlaneContact<D> {
         let RigidPlane { normal, stiffness, .. } = placed.plane;
         let moved = self.displacement(field, element);
         let (home, radius, area) = match element.checked_sub(self.faces.len()) {
@@ -220,12 +225,19 @@ impl<const D: usize> Planes<D> {
         };
         let place: [f64; D] = std::array::from_fn(|d| home[d] + moved[d] - radius * normal[d]);
         let shift: f64 = (0..D).map(|d| placed.now[d] * normal[d]).sum();
-        let stiffness = stiffness * self.penalty.at(self.head(element)) * area;
-        Touch { element, place, overlap: shift - placed.plane.height(place), offset: None, area, stiffness }
+        let stiffness = stiffness * self.penalty.value_at(self.head(element)) * area;
+        PlaneContact {
+            element,
+            place,
+            overlap: shift - placed.plane.height(place),
+            offset: None,
+            area,
+            stiffness,
+        }
     }
 
     /// Elements that a plane acts on, in order: its tied faces, or those behind it.
-    fn touches(&self, placed: &MovingPlane<D>, field: &Field<D>) -> Vec<Touch<D>> {
+    fn touches(&self, placed: &MovingPlane<D>, field: &Field<D>) -> Vec<PlaneContact<D>> {
         if placed.plane.bonded {
             let tied = |&face: &u32| {
                 let mut element = face as usize;
@@ -244,7 +256,7 @@ impl<const D: usize> Planes<D> {
     }
 
     /// Elements nearer to a plane than `gap`, m, in order.
-    pub(super) fn near(&self, placed: &MovingPlane<D>, field: &Field<D>, gap: f64) -> Vec<Touch<D>> {
+    pub(super) fn near(&self, placed: &MovingPlane<D>, field: &Field<D>, gap: f64) -> Vec<PlaneContact<D>> {
         let count = self.elements();
         let batch = |start: usize| {
             let range = start * BATCH..((start + 1) * BATCH).min(count);
@@ -257,7 +269,7 @@ impl<const D: usize> Planes<D> {
     }
 
     /// Computes the forces of all planes at a displacement, with friction for the motion since `start`.
-    pub fn update(&mut self, field: &Field<D>, held: &[Grip], start: Option<&Field<D>>) {
+    pub fn update(&mut self, field: &Field<D>, held: &[FrictionPair], start: Option<&Field<D>>) {
         let mut pushes = std::mem::take(&mut self.pushes);
         pushes.clear();
         let mut add = |planes: &Self, element: usize, force: [f64; D]| {
@@ -333,7 +345,7 @@ impl<const D: usize> Planes<D> {
     }
 
     /// Number of faces in contact, deepest overlap over half a spacing, and energy, J.
-    pub fn touching(&self, field: &Field<D>) -> (u64, f64, f64) {
+    pub fn summary(&self, field: &Field<D>) -> (u64, f64, f64) {
         let mut all = (0, 0.0_f64, 0.0);
         for touch in self.each.iter().flat_map(|placed| self.touches(placed, field)) {
             all.0 += 1;
@@ -344,7 +356,7 @@ impl<const D: usize> Planes<D> {
     }
 
     /// Force, area and width of the contact with each plane, without friction.
-    pub fn resting(&self, field: &Field<D>) -> Vec<PlaneReaction> {
+    pub fn reactions(&self, field: &Field<D>) -> Vec<PlaneReaction> {
         let of = |placed: &MovingPlane<D>| {
             let normal = placed.plane.normal;
             let mut resting = PlaneReaction { gap: f64::INFINITY, ..PlaneReaction::default() };
@@ -357,7 +369,7 @@ impl<const D: usize> Planes<D> {
                 resting.area += touch.area;
                 push += along;
                 let from: [f64; D] = std::array::from_fn(|d| touch.place[d] - placed.plane.point[d]);
-                let across = super::grip::across(&normal, from);
+                let across = super::friction_pair::across(&normal, from);
                 (0..D).for_each(|d| {
                     first[d] += along * across[d];
                     second[d] += along * across[d] * across[d];

@@ -1,6 +1,6 @@
 //! Rubber as the full network: a Langevin chain along every bond, and a pressure that conserves the volume.
 
-use super::crushed::{logarithm, logarithm_slopes};
+use super::compression::{logarithm, logarithm_slopes};
 use super::eight_chain::LINEAR;
 use super::point::{GRADIENT, LEAST_SHAPE};
 use super::tensor::{BodyTensor, cofactor, invert};

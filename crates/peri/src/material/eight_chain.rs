@@ -1,6 +1,6 @@
 //! Rubber as a network of Langevin chains with a pressure that conserves the volume.
 
-use super::crushed::{CRUSHED, inverse_square, logarithm, logarithm_slopes};
+use super::compression::{CRUSH_LIMIT, inverse_square, logarithm, logarithm_slopes};
 use super::point_law::{Deformation, PointLaw, PointStress};
 use super::tensor::cofactor;
 use crate::calibrate::Space;
@@ -139,7 +139,7 @@ impl<const D: usize> EightChainSolid<D> {
             let square = inverse_square(jacobian);
             // J⁻² − 1 with all digits
             let third =
-                if jacobian > CRUSHED { -change * (2.0 + change) * square[0] } else { square[0] - 1.0 };
+                if jacobian > CRUSH_LIMIT { -change * (2.0 + change) * square[0] } else { square[0] - 1.0 };
             return Thickness { third, change: 0.0, square };
         }
         // ∂W/∂λ₃ = μλ₃ + U′(Jλ₃) J = 0

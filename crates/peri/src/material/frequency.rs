@@ -12,7 +12,7 @@
 //! greatest of Σ_j ω(1 − cos k·ξ) over Σ_j ω, both measured. Shape tensors enter by R_i: a family of few
 //! bonds is stiff, and its neighbours share that stiffness.
 
-use super::point::{Reach, SolidPoint};
+use super::point::{FrequencyTerms, SolidPoint};
 use super::point_law::PointLaw;
 use super::{DeformedBody, Family};
 use crate::field::{CHUNK, chunk_range};
@@ -60,7 +60,7 @@ impl<const D: usize> SolidPoint<D> {
         if self.reach.size.is_nan() {
             self.measure(family);
         }
-        let Reach { size, among, squares, .. } = self.reach;
+        let FrequencyTerms { size, among, squares, .. } = self.reach;
         if !self.has_gradient() {
             (self.reach.front, self.reach.slope) = (0.0, 0.0);
             return 4.0 * self.spring * squares;

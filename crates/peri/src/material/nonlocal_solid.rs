@@ -2,8 +2,8 @@
 //! energy.
 
 use super::cloud_passes::CloudPasses;
-use super::crushed::CRUSHED;
-use super::point::{GRADIENT, Relieved, SolidPoint};
+use super::compression::CRUSH_LIMIT;
+use super::point::{GRADIENT, ReliefTerms, SolidPoint};
 use super::point_law::{Deformation, NonlocalSolid, PointLaw};
 use super::solid_passes::SolidPasses;
 use super::tensor::BodyTensor;
@@ -17,7 +17,7 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
 
     fn begin(&self, family: &Family<D>) -> SolidPoint<D> {
         let zero = BodyTensor::zeros();
-        let relief = || Box::new(Relieved { gradient: zero, part: zero, piola: zero });
+        let relief = || Box::new(ReliefTerms { gradient: zero, part: zero, piola: zero });
         let relief = family.is_relieved().then(relief);
         SolidPoint { whole: family.sum(|bond| bond.volume), relief, ..SolidPoint::default() }
     }
@@ -135,7 +135,7 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
 
     fn is_crushed(&self, point: &SolidPoint<D>) -> bool {
         let change = point.deformation().map_or(0.0, Deformation::volume_change);
-        change.is_nan() || change < CRUSHED - 1.0
+        change.is_nan() || change < CRUSH_LIMIT - 1.0
     }
 
     /// Micromodulus for Young's modulus E ≈ 3μ.

@@ -33,14 +33,14 @@ pub struct SolidPoint<const D: usize> {
     /// Share of the particle in the bound of the stiffness, N/m⁴.
     pub(super) own: f64,
     /// Terms of the frequency bound, see [`super::frequency`].
-    pub(super) reach: Reach,
+    pub(super) reach: FrequencyTerms,
     /// Correction by θ, if bonds have one.
-    pub(super) relief: Option<Box<Relieved<D>>>,
+    pub(super) relief: Option<Box<ReliefTerms<D>>>,
 }
 
 /// Correction of a particle by θ.
 #[derive(Clone, Debug)]
-pub(super) struct Relieved<const D: usize> {
+pub(super) struct ReliefTerms<const D: usize> {
     /// G = Σ_J ω (θ_J − θ_I)⊗ξ M⁻¹/I.
     pub(super) gradient: BodyTensor<D>,
     /// Σ_J ω ζ⊗z(θ)/I, a part of the displacement gradient.
@@ -63,7 +63,7 @@ impl<const D: usize> Default for SolidPoint<D> {
             stress: zero,
             spring: 0.0,
             own: 0.0,
-            reach: Reach::default(),
+            reach: FrequencyTerms::default(),
             relief: None,
         }
     }
@@ -214,7 +214,7 @@ impl<const D: usize> SolidPoint<D> {
 
 /// Terms of a particle in the frequency bound, see [`super::frequency`].
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Reach {
+pub(super) struct FrequencyTerms {
     /// R and b, 1/m, and Σ_J V_J/|ξ|² of the intact bonds, m; NaN until computed.
     pub(super) size: f64,
     pub(super) own: f64,
@@ -226,13 +226,13 @@ pub(super) struct Reach {
     pub(super) slope: f64,
 }
 
-impl Default for Reach {
+impl Default for FrequencyTerms {
     fn default() -> Self {
         Self { size: f64::NAN, own: f64::NAN, squares: f64::NAN, among: f64::NAN, front: 0.0, slope: 0.0 }
     }
 }
 
-impl Reach {
+impl FrequencyTerms {
     /// Marks the terms as outdated after bonds have changed.
     pub fn forget(&mut self) {
         self.size = f64::NAN;

@@ -7,8 +7,8 @@
 //! 0: symmetric and positive definite as soon as some particles have θ = 0. Cf. Chen, Hillman & Rüter 2013,
 //! doi:10.1002/nme.4512.
 
-use super::levels::SplineLevels;
 use super::point::LEAST_SHAPE;
+use super::spline_levels::SplineLevels;
 use super::tensor::{Vector, invert};
 use crate::bonds::{BodyGeometry, BondKind, Bonds, CloudBonds, CloudPlaces, MomentColumns};
 use crate::field::{CHUNK, Field};

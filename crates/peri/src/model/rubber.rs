@@ -31,15 +31,15 @@ impl Rubber {
     /// Creates rubber of Young's modulus E, Pa, that does not break. Chains have n̄ = 720 links of D̂ = 1200
     /// unless [`Self::chains`] sets others.
     pub fn new(law: Law, youngs_modulus: f64) -> Self {
-        Self::of(RubberLaw::Named(law), youngs_modulus)
+        Self::from_law(RubberLaw::Named(law), youngs_modulus)
     }
 
     /// Creates rubber of any law, scaled so that t′(1) = 3, as the calibration of kθ expects.
-    pub fn of_law(law: impl BondPotential + 'static, youngs_modulus: f64) -> Self {
-        Self::of(RubberLaw::Own(Arc::new(law)), youngs_modulus)
+    pub fn with_law(law: impl BondPotential + 'static, youngs_modulus: f64) -> Self {
+        Self::from_law(RubberLaw::Own(Arc::new(law)), youngs_modulus)
     }
 
-    fn of(law: RubberLaw, youngs_modulus: f64) -> Self {
+    fn from_law(law: RubberLaw, youngs_modulus: f64) -> Self {
         let (links, dissociation, calibration) = (720.0, 1200.0, Calibration::Continuum);
         Self { law, youngs_modulus, links, dissociation, calibration, critical: None }
     }

@@ -43,13 +43,13 @@ impl<const D: usize> StressEvaluator<D> {
 
     /// Creates an evaluator of a bond law that is fitted to a relative error of `bound`; the law is `clamped`
     /// beyond the fitted stretches if bonds break.
-    pub fn of_bonds(material: BondMaterial<'static>, bound: f64, clamped: bool) -> Self {
+    pub fn for_bonds(material: BondMaterial<'static>, bound: f64, clamped: bool) -> Self {
         Self(EvaluatorKind::Bonds { material, bound, clamped, last: Mutex::new(None) })
     }
 
     /// Creates an evaluator of a solid; `bonds` are those of the reference state. A law `learnt` from data
     /// has flags.
-    pub fn of_solid(law: Arc<dyn PointLaw<D>>, learnt: bool, bonds: &dyn Bonds<D>) -> Self {
+    pub fn for_solid(law: Arc<dyn PointLaw<D>>, learnt: bool, bonds: &dyn Bonds<D>) -> Self {
         let states = Mutex::new(Pointwise::new(NonlocalSolid(law.clone()), bonds));
         Self(EvaluatorKind::Solid { law, learnt, states })
     }

@@ -107,11 +107,11 @@ pub enum Policy {
 /// Stretches below this are not fitted …
 const SMALLEST_STRETCH: f64 = 1e-3;
 /// … nor below this if bonds break: beside a crack without contact bonds are crushed to zero.
-const CRUSHED: f64 = 0.1;
+const CRUSHED_STRETCH: f64 = 0.1;
 
 /// Smallest fitted stretch.
 pub(super) fn least(breaking: Option<&Breaking>) -> f64 {
-    if breaking.is_some() { CRUSHED } else { SMALLEST_STRETCH }
+    if breaking.is_some() { CRUSHED_STRETCH } else { SMALLEST_STRETCH }
 }
 
 /// Largest fitted stretch.

@@ -3,11 +3,11 @@
 //! enough (the curvature condition), found by secants.
 
 use super::balance::SearchLimits;
+use super::lbfgs_memory::LbfgsMemory;
 use super::load_stepping::{Equilibrium, QuasiStatic};
-use super::memory::LbfgsMemory;
 use super::method::Watch;
+use super::particle_map::ParticleMap;
 use super::passes::{ForceSums, gradient_pass};
-use super::places::Places;
 use super::preconditioner::Preconditioner;
 use super::record::Status;
 use super::state::State;
@@ -24,7 +24,7 @@ const ITERATIONS: u64 = 200;
 /// Iterations between checks of contact.
 const TOUCHES: u64 = 10;
 /// … and growth of a search over the first one with it, or over so few iterations.
-const WORN: u64 = 2;
+const WORN_GROWTH: u64 = 2;
 const FEW: u64 = 10;
 /// σ: fraction of the first slope that may remain.
 const SLOPE: f64 = 0.9;
@@ -41,9 +41,9 @@ const CRUSH: f64 = 0.6;
 
 /// Largest change of a bond over its length in a step with softening bonds, so that none jumps over its
 /// energy's maximum.
-const LEAP: f64 = 0.3;
+const LARGEST_CHANGE: f64 = 0.3;
 /// Scale at which a direction exceeds the bonds by far; a power of 2, so that nothing is rounded.
-const FAR: f64 = (1_u64 << 40) as f64;
+const HUGE_SCALE: f64 = (1_u64 << 40) as f64;
 
 /// Quasi-static solution by limited-memory BFGS with a two-level preconditioner: the fastest method and the
 /// first choice for equilibria, with and without breaking bonds.
@@ -96,7 +96,7 @@ pub struct LbfgsSolver<const D: usize> {
     preconditioner: Preconditioner<D>,
     memory: LbfgsMemory<D>,
     /// Positions of particles in storage: all fields below are over particles.
-    places: Places,
+    places: ParticleMap,
     /// Gradients −V F of the energy at the iterate and at the trial, 0 where constrained.
     gradient: Field<D>,
     trial: Field<D>,
@@ -139,7 +139,7 @@ impl<const D: usize> LbfgsSolver<D> {
             settings,
             preconditioner: Preconditioner::new(),
             memory: LbfgsMemory::new(settings.memory),
-            places: Places::default(),
+            places: ParticleMap::default(),
             gradient: Field::zeros(0),
             trial: Field::zeros(0),
             image: Field::zeros(0),
@@ -173,7 +173,7 @@ impl<const D: usize> LbfgsSolver<D> {
         ];
         if fields[0].sites() != particles {
             fields.into_iter().for_each(|field| *field = Field::zeros(particles));
-            self.places = Places::new(&*system.bonds, &system.loads);
+            self.places = ParticleMap::new(&*system.bonds, &system.loads);
         }
         self.memory.clear(true);
         self.local_only = false;
@@ -199,12 +199,12 @@ impl<const D: usize> LbfgsSolver<D> {
     }
 
     /// Evaluates, and again if the fitted law had to be widened.
-    fn look(&mut self, system: &mut System<D>, state: &mut State<D>) -> Result<LinePoint, Error> {
+    fn evaluate_covered(&mut self, system: &mut System<D>, state: &mut State<D>) -> Result<LinePoint, Error> {
         let point = self.evaluate(system, state);
         if !point.sums.is_finite() {
             return Ok(point);
         }
-        state.stretches.see(point.observed);
+        state.stretches.observe(point.observed);
         Ok(if system.widen(state)? { self.evaluate(system, state) } else { point })
     }
 
@@ -249,7 +249,7 @@ impl<const D: usize> LbfgsSolver<D> {
                 step = low + (high - low) * (1.0 / excess).clamp(1e-6, 0.5);
                 continue;
             }
-            state.stretches.see(rough.observed);
+            state.stretches.observe(rough.observed);
             let point = if system.widen(state)? { self.evaluate(system, state) } else { rough };
             if point.sums.residual(state.convergence.floor) <= self.settings.tolerance
                 || point.slope.abs() <= SLOPE * slope.abs()
@@ -292,8 +292,8 @@ impl<const D: usize> LbfgsSolver<D> {
         if !softens {
             return longest;
         }
-        let range = stretch_range(&*system.bonds, &spread(FAR));
-        (LEAP * FAR / (1.0 + range.high).sqrt()).min(longest)
+        let range = stretch_range(&*system.bonds, &spread(HUGE_SCALE));
+        (LARGEST_CHANGE * HUGE_SCALE / (1.0 + range.high).sqrt()).min(longest)
     }
 
     /// Runs one iteration from `point`; returns the next iterate, `None` if no direction gave a descent.
@@ -349,7 +349,7 @@ impl<const D: usize> LbfgsSolver<D> {
 
     /// Computes forces and gradient of an iterate that no search produced.
     fn arrive(&mut self, system: &mut System<D>, state: &mut State<D>) -> Result<LinePoint, Error> {
-        let point = self.look(system, state)?;
+        let point = self.evaluate_covered(system, state)?;
         if !point.sums.is_finite() {
             return Err(system.not_finite(state));
         }
@@ -383,12 +383,12 @@ impl<const D: usize> Equilibrium<D> for LbfgsSolver<D> {
         let mut point = self.arrive(system, state)?;
         let mut broken = false;
         loop {
-            state.note(system, &point.sums, &goal);
+            state.record_sums(system, &point.sums, &goal);
             if state.is_balanced(&goal, broken)? {
                 let took = state.counts.total_iterations - before;
                 self.first = if self.searches == 0 { took } else { self.first };
                 self.searches += 1;
-                self.worn = took > WORN * self.first.max(FEW);
+                self.worn = took > WORN_GROWTH * self.first.max(FEW);
                 return Ok(Some(point.observed));
             }
             broken = false;
@@ -404,8 +404,8 @@ impl<const D: usize> Equilibrium<D> for LbfgsSolver<D> {
                 let sites = system.break_bonds(state);
                 broken = !sites.is_empty();
                 if broken {
-                    self.broke(system, &sites);
-                    system.refuse_adrift(state, self.settings.tolerance)?;
+                    self.bonds_broke(system, &sites);
+                    system.refuse_unsupported(state, self.settings.tolerance)?;
                     point = self.arrive(system, state)?;
                 }
             }
@@ -419,8 +419,8 @@ impl<const D: usize> Equilibrium<D> for LbfgsSolver<D> {
         }
     }
 
-    fn broke(&mut self, system: &System<D>, sites: &[u32]) {
-        self.preconditioner.broke(&*system.bonds, sites);
+    fn bonds_broke(&mut self, system: &System<D>, sites: &[u32]) {
+        self.preconditioner.bonds_broke(&*system.bonds, sites);
         self.memory.clear(false);
     }
 

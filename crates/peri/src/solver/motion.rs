@@ -18,8 +18,8 @@ pub struct Motion {
     pub energies: DynamicEnergies,
     /// Stretches at the last check.
     pub(super) look: StretchLook,
-    /// Stiffness control of materials whose stiffness depends on the displacement, see [`super::pace`].
-    pub(super) pace: Pace,
+    /// Stiffness control of materials whose stiffness depends on the displacement, see [`super::stiffness_control`].
+    pub(super) pace: StiffnessControl,
 }
 
 /// Sequence of equal time steps.
@@ -91,9 +91,9 @@ pub struct BondSums {
     pub extent: f64,
 }
 
-/// Greatest frequency, as far as known, see [`super::pace`].
+/// Greatest frequency, as far as known, see [`super::stiffness_control`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Pace {
+pub struct StiffnessControl {
     /// m when ω² was last measured, N/m⁴, and r.
     pub(super) bound: f64,
     pub(super) part: f64,

@@ -2,7 +2,7 @@
 //! the gradient of L-BFGS.
 
 use super::load::Loads;
-use super::places::Places;
+use super::particle_map::ParticleMap;
 use super::state::State;
 use super::system::System;
 use crate::bonds::StretchRange;
@@ -100,7 +100,7 @@ pub fn force_pass<const D: usize>(
         });
     let (mut sums, observed) = all;
     // planes hold a body, too
-    sums.constrained += system.repulsion().map_or(0.0, |contact| contact.square_of_planes());
+    sums.constrained += system.repulsion().map_or(0.0, |contact| contact.plane_force_square());
     (sums, observed)
 }
 
@@ -109,7 +109,7 @@ pub fn force_pass<const D: usize>(
 pub fn gradient_pass<const D: usize>(
     system: &System<D>,
     state: &mut State<D>,
-    (places, volumes): (&Places, &[f64]),
+    (places, volumes): (&ParticleMap, &[f64]),
     direction: &Field<D>,
     factor: f64,
     gradient: &mut Field<D>,
@@ -125,7 +125,7 @@ pub fn gradient_pass<const D: usize>(
             system.internal_force(displacement, item * CHUNK, &mut force, Some(&mut observed));
             let (mut sums, mut slope) = (ForceSums::default(), 0.0);
             let particles = places.of_item(item);
-            let held = places.held(particles.clone());
+            let held = places.constrained(particles.clone());
             for d in 0..D {
                 if let Some(body) = &loads.body_force {
                     for (f, b) in force[d].iter_mut().zip(&body.components()[d][chunk_range(item, sites)]) {
@@ -153,7 +153,7 @@ pub fn gradient_pass<const D: usize>(
         (sums.add(item.0), observed.join(item.1), slope + item.2)
     });
     // planes hold a body, too
-    sums.constrained += system.repulsion().map_or(0.0, |contact| contact.square_of_planes());
+    sums.constrained += system.repulsion().map_or(0.0, |contact| contact.plane_force_square());
     (sums, observed, slope)
 }
 

@@ -1,6 +1,6 @@
 //! Rows of a run's history, and the status of an iteration.
 
-use super::scale::Balance;
+use super::force_scale::Balance;
 use crate::contact::{ContactSummary, PlaneReaction};
 use serde::{Deserialize, Serialize};
 

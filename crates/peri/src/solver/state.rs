@@ -3,8 +3,8 @@
 use super::fracture::Fracture;
 use super::motion::Motion;
 use super::record::{Status, StepRecord};
-use super::steps::{Accepted, StepControl};
-use crate::contact::Grip;
+use super::step_control::{Accepted, StepControl};
+use crate::contact::FrictionPair;
 use crate::field::Field;
 use crate::potential::StretchRange;
 use serde::{Deserialize, Serialize};
@@ -82,7 +82,7 @@ pub struct BodyStretches {
 
 impl BodyStretches {
     /// Records observed stretches.
-    pub(super) fn see(&mut self, observed: StretchRange) {
+    pub(super) fn observe(&mut self, observed: StretchRange) {
         self.observed = self.observed.join(observed);
     }
 
@@ -143,9 +143,9 @@ pub(super) struct ContactState<const D: usize> {
     /// Displacement at the start of the load step, with friction between equilibria.
     pub start: Option<Field<D>>,
     /// Friction after the last step.
-    pub grips: Vec<Grip>,
+    pub grips: Vec<FrictionPair>,
     /// Active friction in the search for the current equilibrium, and its number of renewals in this step.
-    pub active: Vec<Grip>,
+    pub active: Vec<FrictionPair>,
     pub renewals: u32,
 }
 

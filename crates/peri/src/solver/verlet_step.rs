@@ -49,10 +49,10 @@ impl VerletSums {
 
 /// Sites whose stretches are tracked together if bonds may break, a divisor of [`CHUNK`]: near a crack, few
 /// such ranges hold overstretched bonds, but many work items do.
-const LOOK: usize = 256;
+const CHECKED_SITES: usize = 256;
 
 /// A work item of two fields.
-pub type Two<'a, const D: usize> = ([&'a mut [f64]; D], [&'a mut [f64]; D]);
+pub type FieldPair<'a, const D: usize> = ([&'a mut [f64]; D], [&'a mut [f64]; D]);
 
 /// Updates v ← v + ½Δt a and u ← u + Δt v; constrained components go to F d.
 pub fn leap_pass<const D: usize>(
@@ -65,7 +65,7 @@ pub fn leap_pass<const D: usize>(
     let keep = 1.0 - 0.5 * leap.damping * leap.step;
     let push = 0.5 * leap.step / leap.density;
     let (displacement, velocity) = (state.displacement.chunks_mut(), state.velocity.chunks_mut());
-    let of = |(chunk, (u, v)): (usize, Two<D>)| {
+    let of = |(chunk, (u, v)): (usize, FieldPair<D>)| {
         let range = chunk_range(chunk, volumes.len());
         let mut sums = VerletSums::default();
         for d in 0..D {
@@ -111,8 +111,8 @@ pub fn force_pass<const D: usize>(
 ) -> (VerletSums, StretchRange) {
     let (loads, displacement, body) = (&*system.loads, &state.displacement, &*system);
     let (force, velocity) = (state.force.chunks_mut(), state.velocity.chunks_mut());
-    let part = if look { body.piece().max(LOOK) } else { CHUNK };
-    let of = |(chunk, (mut f, mut v)): (usize, Two<D>)| {
+    let part = if look { body.piece().max(CHECKED_SITES) } else { CHUNK };
+    let of = |(chunk, (mut f, mut v)): (usize, FieldPair<D>)| {
         let (start, length) = (chunk * CHUNK, f[0].len());
         let mut seen = Vec::new();
         for from in (0..length).step_by(part) {

@@ -2,7 +2,7 @@
 
 use super::window::{StressWindow, bond_function};
 use super::{
-    BallVolume, Loaded, StressMeasure, StressTensor, ball_volume, force_over_length, segment_fraction,
+    BallVolume, StressInput, StressMeasure, StressTensor, ball_volume, force_over_length, segment_fraction,
 };
 use crate::bonds::{BodyGeometry, CellGrid, CloudBonds, Neighbour, Stencil};
 use pulp::{Arch, NullaryFnOnce};
@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 pub fn piola<const D: usize>(
     bonds: &CloudBonds<D>,
-    state: &Loaded<D>,
+    state: &StressInput<D>,
     measure: StressMeasure,
     ball: BallVolume,
 ) -> Vec<StressTensor<D>> {
@@ -18,7 +18,8 @@ pub fn piola<const D: usize>(
     let grid = CellGrid::new(&points, bonds.horizon());
     if measure.is_partition() {
         // scenes refuse measures that need a lattice
-        let window = if measure.needs_lattice() { StressWindow::Ball } else { StressWindow::of(measure) };
+        let window =
+            if measure.needs_lattice() { StressWindow::Ball } else { StressWindow::for_measure(measure) };
         return CloudShares { bonds, state, window, points: &points, grid: &grid }.stress();
     }
     in_balls(bonds, state, (measure, ball), &points, &grid)
@@ -27,7 +28,7 @@ pub fn piola<const D: usize>(
 /// Computes the other measures: every particle searches for the bonds that cross its ball.
 fn in_balls<const D: usize>(
     bonds: &CloudBonds<D>,
-    state: &Loaded<D>,
+    state: &StressInput<D>,
     (measure, ball): (StressMeasure, BallVolume),
     points: &[[f64; D]],
     grid: &CellGrid<D>,
@@ -109,7 +110,7 @@ fn in_balls<const D: usize>(
 /// f V_I V_J ⊗ ξ of a bond, N m.
 fn moment<const D: usize>(
     bonds: &CloudBonds<D>,
-    state: &Loaded<D>,
+    state: &StressInput<D>,
     own: usize,
     bond: &Neighbour<D>,
 ) -> StressTensor<D> {
@@ -124,7 +125,7 @@ fn moment<const D: usize>(
 /// function in p's window.
 struct CloudShares<'a, const D: usize> {
     bonds: &'a CloudBonds<D>,
-    state: &'a Loaded<'a, D>,
+    state: &'a StressInput<'a, D>,
     window: StressWindow,
     points: &'a [[f64; D]],
     grid: &'a CellGrid<D>,
@@ -157,7 +158,7 @@ impl<const D: usize> CloudShares<'_, D> {
                         bonds.push(bond);
                     }
                 });
-                let shares = arch.dispatch(Given { shares: self, own, bonds: &bonds, around: &around });
+                let shares = arch.dispatch(ShareKernel { shares: self, own, bonds: &bonds, around: &around });
                 (around.members, shares)
             };
             let all: Vec<_> = owners.par_iter().map(of).collect();
@@ -200,14 +201,14 @@ impl<const D: usize> CloudShares<'_, D> {
 }
 
 /// Distributes the bonds of `own` over the particles around it.
-struct Given<'a, const D: usize> {
+struct ShareKernel<'a, const D: usize> {
     shares: &'a CloudShares<'a, D>,
     own: usize,
     bonds: &'a [Neighbour<D>],
     around: &'a ParticlesInReach<D>,
 }
 
-impl<const D: usize> NullaryFnOnce for Given<'_, D> {
+impl<const D: usize> NullaryFnOnce for ShareKernel<'_, D> {
     type Output = Vec<StressTensor<D>>;
     #[inline(always)]
     fn call(self) -> Vec<StressTensor<D>> {

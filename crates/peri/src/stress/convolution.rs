@@ -106,7 +106,7 @@ impl Aligned {
 }
 
 /// Bonds of one offset from every site.
-pub struct Shared<const D: usize> {
+pub struct OffsetBonds<const D: usize> {
     sites: usize,
     /// Number of zeros before and behind the sites: whole chunks.
     margin: usize,
@@ -120,7 +120,7 @@ pub struct Shared<const D: usize> {
     shift: isize,
 }
 
-impl<const D: usize> Shared<D> {
+impl<const D: usize> OffsetBonds<D> {
     /// Allocates storage without bonds. No tap reaches farther than `reach` sites, no bond farther than
     /// `bond`.
     pub fn new(occupied: &[bool], filled: Vec<bool>, reach: usize, bond: usize) -> Self {
@@ -196,9 +196,9 @@ impl<const D: usize> ShareSums<D> {
     }
 }
 
-/// Runs [`Shared::add`] over a chunk.
+/// Runs [`OffsetBonds::add`] over a chunk.
 struct ConvolutionChunk<'a, const D: usize> {
-    shared: &'a Shared<D>,
+    shared: &'a OffsetBonds<D>,
     /// Taps for the numbers of the bonds, and in a plane for their existence.
     runs: &'a [TapRuns; 2],
     completed: &'a [bool],
@@ -287,7 +287,7 @@ impl<const D: usize> ConvolutionChunk<'_, D> {
     /// Computes the weights of the bonds whose two particles exist, V vectors at a time.
     #[inline(always)]
     fn existing<S: Simd, const V: usize>(&self, simd: S, start: usize, weights: &mut [f64]) {
-        let Shared { occupied, shift, margin, .. } = self.shared;
+        let OffsetBonds { occupied, shift, margin, .. } = self.shared;
         let (source, width) = (TapSource { numbers: occupied, lanes: 1, bond: *shift }, V * S::F64_LANES);
         for part in 0..weights.len() / width {
             let sums = source.total::<S, V, true>(simd, &self.runs[1], margin + start + part * width);

@@ -1,11 +1,11 @@
 //! Stress on a lattice, where the bond function depends on offsets only: each measure is, bond by bond of the
 //! stencil, a convolution of that bond's forces with fixed weights. The forces are the same for all measures.
 
-use super::convolution::{ShareSums, Shared, Tap, tiles};
-use super::pull::forces;
-use super::window::{Averaged, StressWindow, normalise};
+use super::bond_forces::forces;
+use super::convolution::{OffsetBonds, ShareSums, Tap, tiles};
+use super::window::{AveragedWindow, StressWindow, normalise};
 use super::{
-    BallVolume, Loaded, MeasuredStress, StressMeasure, ball_volume, cell_fractions, segment_fraction,
+    BallVolume, MeasuredStress, StressInput, StressMeasure, ball_volume, cell_fractions, segment_fraction,
 };
 use crate::bonds::{BodyGeometry, LatticeBonds};
 use rayon::prelude::*;
@@ -15,7 +15,7 @@ use std::time::Instant;
 /// Sums of a measure, and their run time.
 struct StressSums<const D: usize> {
     measure: StressMeasure,
-    window: Option<Averaged<D>>,
+    window: Option<AveragedWindow<D>>,
     /// Taps of each bond of half the stencil.
     taps: Vec<Vec<Tap>>,
     shares: ShareSums<D>,
@@ -23,10 +23,11 @@ struct StressSums<const D: usize> {
 }
 
 impl<const D: usize> StressSums<D> {
-    fn new(bonds: &LatticeBonds<D>, state: &Loaded<D>, measure: StressMeasure) -> Self {
+    fn new(bonds: &LatticeBonds<D>, state: &StressInput<D>, measure: StressMeasure) -> Self {
         let started = Instant::now();
-        let window =
-            measure.is_partition().then(|| Averaged::<D>::new(StressWindow::of(measure), bonds.ratio()));
+        let window = measure
+            .is_partition()
+            .then(|| AveragedWindow::<D>::new(StressWindow::for_measure(measure), bonds.ratio()));
         let mut alike = BTreeMap::new();
         let half = half(bonds).iter();
         let taps = half.map(|&offset| taps(bonds, offset, measure, window.as_ref(), &mut alike)).collect();
@@ -35,7 +36,7 @@ impl<const D: usize> StressSums<D> {
     }
 
     /// Divides the sums by the volumes.
-    fn finish(self, bonds: &LatticeBonds<D>, state: &Loaded<D>, ball: BallVolume) -> MeasuredStress<D> {
+    fn finish(self, bonds: &LatticeBonds<D>, state: &StressInput<D>, ball: BallVolume) -> MeasuredStress<D> {
         let started = Instant::now();
         let volumes = volumes(bonds, state, self.measure, ball, self.window.as_ref());
         let one = |(&site, volume): (&u32, f64)| {
@@ -55,7 +56,7 @@ fn half<const D: usize>(bonds: &LatticeBonds<D>) -> &[[i32; D]] {
 
 pub fn piolas<const D: usize>(
     bonds: &LatticeBonds<D>,
-    state: &Loaded<D>,
+    state: &StressInput<D>,
     measures: &[StressMeasure],
     ball: BallVolume,
 ) -> Vec<MeasuredStress<D>> {
@@ -66,7 +67,7 @@ pub fn piolas<const D: usize>(
     let longest = half(bonds).iter().map(|&offset| bonds.shift(offset).unsigned_abs());
     let (reach, longest) = (reach.max().unwrap_or(0), longest.max().unwrap_or(0));
     let filled = tiles(bonds.sites(), bonds.particles());
-    let mut shared = Shared::new(&bonds.occupancy(), filled, reach, longest);
+    let mut shared = OffsetBonds::new(&bonds.occupancy(), filled, reach, longest);
     let mut seconds = started.elapsed().as_secs_f64();
     for (k, &offset) in half(bonds).iter().enumerate() {
         let started = Instant::now();
@@ -87,13 +88,13 @@ pub fn piolas<const D: usize>(
 }
 
 /// Bond functions of offsets that differ only in the order and signs of their components.
-type Alike<const D: usize> = BTreeMap<[i32; D], Vec<([i32; D], f64)>>;
+type EquivalentOffsets<const D: usize> = BTreeMap<[i32; D], Vec<([i32; D], f64)>>;
 
 /// Bond function of an offset, from that of the equivalent one with ascending, non-negative components.
 fn bond_function<const D: usize>(
-    window: &Averaged<D>,
+    window: &AveragedWindow<D>,
     offset: [i32; D],
-    alike: &mut Alike<D>,
+    alike: &mut EquivalentOffsets<D>,
 ) -> Vec<([i32; D], f64)> {
     let mut order: [usize; D] = std::array::from_fn(|d| d);
     order.sort_by_key(|&d| offset[d].abs());
@@ -116,8 +117,8 @@ fn taps<const D: usize>(
     bonds: &LatticeBonds<D>,
     offset: [i32; D],
     measure: StressMeasure,
-    window: Option<&Averaged<D>>,
-    alike: &mut Alike<D>,
+    window: Option<&AveragedWindow<D>>,
+    alike: &mut EquivalentOffsets<D>,
 ) -> Vec<Tap> {
     let weights = match (measure, window) {
         (StressMeasure::OnePoint, _) => vec![([0; D], 0.5), (offset.map(|o| -o), 0.5)],
@@ -155,7 +156,7 @@ fn crossing<const D: usize>(ratio: f64, offset: [i32; D], measure: StressMeasure
 }
 
 /// Sites near a surface whose windows lack bonds, if existing bonds compensate for them.
-fn rim<const D: usize>(bonds: &LatticeBonds<D>, state: &Loaded<D>, measure: StressMeasure) -> Vec<u32> {
+fn rim<const D: usize>(bonds: &LatticeBonds<D>, state: &StressInput<D>, measure: StressMeasure) -> Vec<u32> {
     let wanted = |site: usize| match measure {
         StressMeasure::HardyBonds => true,
         StressMeasure::HardyWindow => false,
@@ -184,10 +185,10 @@ fn rim<const D: usize>(bonds: &LatticeBonds<D>, state: &Loaded<D>, measure: Stre
 /// Divisor of the sum over bonds, particle by particle.
 fn volumes<const D: usize>(
     bonds: &LatticeBonds<D>,
-    state: &Loaded<D>,
+    state: &StressInput<D>,
     measure: StressMeasure,
     ball: BallVolume,
-    window: Option<&Averaged<D>>,
+    window: Option<&AveragedWindow<D>>,
 ) -> Vec<f64> {
     let lattice = bonds.lattice();
     let thickness = lattice.volume / lattice.spacing.powi(D as i32);

@@ -7,10 +7,10 @@
 //! particle's cell do.
 
 mod ball;
+mod bond_forces;
 mod cloud;
 mod convolution;
 mod lattice;
-mod pull;
 mod window;
 
 pub use ball::{ball_volume, cell_fractions, segment_fraction};
@@ -31,12 +31,12 @@ pub type StressTensor<const D: usize> = [[f64; D]; D];
 #[serde(rename_all = "kebab-case")]
 pub enum StressMeasure {
     /// All bonds crossing the ball, by the fraction inside, averaged over the particle's cell: weights that
-    /// sum to 1 for every bond offset; [`Missing`] treats surfaces.
+    /// sum to 1 for every bond offset; [`SurfaceCompensation`] treats surfaces.
     #[default]
     Hardy,
-    /// [`Self::Hardy`] with [`Missing::Bonds`] everywhere.
+    /// [`Self::Hardy`] with [`SurfaceCompensation::Bonds`] everywhere.
     HardyBonds,
-    /// [`Self::Hardy`] with [`Missing::Window`] everywhere.
+    /// [`Self::Hardy`] with [`SurfaceCompensation::Window`] everywhere.
     HardyWindow,
     /// Without the average over the cell: every bond's weights are divided by their sum.
     HardyScaled,
@@ -104,7 +104,7 @@ impl StressMeasure {
 
 /// Compensation for bonds missing at a surface, of the measures whose weights sum to 1, on a lattice.
 #[derive(Clone, Copy, Debug, Default)]
-pub enum Missing<'a> {
+pub enum SurfaceCompensation<'a> {
     /// Divides every bond offset by the weights of the bonds whose two particles exist; a broken bond counts,
     /// with no force. A uniform strain is then exact up to the surface; under a body force it extrapolates.
     #[default]
@@ -115,7 +115,7 @@ pub enum Missing<'a> {
     WindowAt(&'a [bool]),
 }
 
-impl Missing<'_> {
+impl SurfaceCompensation<'_> {
     fn is_window(self, site: usize) -> bool {
         match self {
             Self::Bonds => false,
@@ -141,7 +141,7 @@ pub enum BallVolume {
 }
 
 /// Bond law and state from which stresses follow.
-pub struct Loaded<'a, const D: usize> {
+pub struct StressInput<'a, const D: usize> {
     /// Displacement, m.
     pub displacement: &'a Field<D>,
     /// Fitted bond law, covering the stretches of `displacement`.
@@ -149,7 +149,7 @@ pub struct Loaded<'a, const D: usize> {
     /// kθ.
     pub modulus: f64,
     /// Compensation for bonds missing at surfaces.
-    pub missing: Missing<'a>,
+    pub missing: SurfaceCompensation<'a>,
 }
 
 /// Stress of every particle by one of several measures.
@@ -165,7 +165,7 @@ pub struct MeasuredStress<const D: usize> {
 /// Computes [`piola`] of several measures. On a lattice they share the forces of bonds.
 pub fn piolas<const D: usize>(
     bonds: &dyn Bonds<D>,
-    state: &Loaded<D>,
+    state: &StressInput<D>,
     measures: &[StressMeasure],
     ball: BallVolume,
 ) -> Vec<MeasuredStress<D>> {
@@ -186,7 +186,7 @@ pub fn piolas<const D: usize>(
 /// Pa.
 pub fn piola<const D: usize>(
     bonds: &dyn Bonds<D>,
-    state: &Loaded<D>,
+    state: &StressInput<D>,
     measure: StressMeasure,
     ball: BallVolume,
 ) -> Vec<StressTensor<D>> {
@@ -200,7 +200,7 @@ pub fn piola<const D: usize>(
 /// Pa, on a lattice.
 pub fn piola_on_lattice<const D: usize>(
     bonds: &LatticeBonds<D>,
-    state: &Loaded<D>,
+    state: &StressInput<D>,
     measure: StressMeasure,
     ball: BallVolume,
 ) -> Vec<StressTensor<D>> {
@@ -215,11 +215,11 @@ pub fn piola_on_lattice<const D: usize>(
 ///
 /// A cloud has neither common offsets of bonds nor cells: a measure whose weights sum to 1 distributes every
 /// bond over the particles whose windows it crosses, by volume × bond function, so that the sum of P V is
-/// that of f ⊗ ξ over all bonds; [`Loaded::missing`] has no effect. Measures that need a lattice
+/// that of f ⊗ ξ over all bonds; [`StressInput::missing`] has no effect. Measures that need a lattice
 /// ([`StressMeasure::needs_lattice`]) are treated as [`StressMeasure::Hardy`]; scenes refuse them.
 pub fn piola_in_cloud<const D: usize>(
     bonds: &CloudBonds<D>,
-    state: &Loaded<D>,
+    state: &StressInput<D>,
     measure: StressMeasure,
     ball: BallVolume,
 ) -> Vec<StressTensor<D>> {

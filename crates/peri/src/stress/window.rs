@@ -21,7 +21,7 @@ pub enum StressWindow {
 
 impl StressWindow {
     /// Window of a measure that is a sum over bonds with a bond function.
-    pub fn of(measure: StressMeasure) -> Self {
+    pub fn for_measure(measure: StressMeasure) -> Self {
         match measure {
             StressMeasure::Gaussian => Self::Gaussian,
             StressMeasure::Spline => Self::Spline,
@@ -50,7 +50,7 @@ impl StressWindow {
 
 /// A window averaged over a cell of edge 1, tabulated on a grid finer than the cells. Its values at points
 /// one cell apart have the same sum wherever the points lie: a partition of unity over the lattice.
-pub struct Averaged<const D: usize> {
+pub struct AveragedWindow<const D: usize> {
     /// Intervals per cell.
     fine: usize,
     /// Cells from the centre to the table's ends.
@@ -60,7 +60,7 @@ pub struct Averaged<const D: usize> {
     values: Vec<f64>,
 }
 
-impl<const D: usize> Averaged<D> {
+impl<const D: usize> AveragedWindow<D> {
     /// Averages a window of `radius` cells.
     pub fn new(window: StressWindow, radius: f64) -> Self {
         let radius = if window == StressWindow::Cell { 1.0 } else { radius };
@@ -82,7 +82,7 @@ impl<const D: usize> Averaged<D> {
     }
 
     /// Averaged window at a point, linear between nodes.
-    pub fn at(&self, x: [f64; D]) -> f64 {
+    pub fn value_at(&self, x: [f64; D]) -> f64 {
         let side = self.side();
         let (mut base, mut part) = (0, [0.0; D]);
         for d in (0..D).rev() {
@@ -131,7 +131,7 @@ impl<const D: usize> Averaged<D> {
                 });
                 let along = |k: usize| {
                     let alpha = (k as f64 + 0.5) / steps as f64;
-                    self.at(std::array::from_fn(|d| f64::from(start[d]) + alpha * f64::from(offset[d])))
+                    self.value_at(std::array::from_fn(|d| f64::from(start[d]) + alpha * f64::from(offset[d])))
                 };
                 let sum: f64 = (0..steps).map(along).sum();
                 (sum > 0.0).then_some((start, sum / steps as f64))
@@ -149,7 +149,7 @@ impl<const D: usize> Averaged<D> {
                 let cell: [i32; D] =
                     std::array::from_fn(|d| (index / across.pow(d as u32) % across) as i32 - reach);
                 let part = |t: usize| {
-                    self.at(std::array::from_fn(|d| {
+                    self.value_at(std::array::from_fn(|d| {
                         f64::from(cell[d]) + middle(t / fine.pow(d as u32) % fine)
                     }))
                 };
@@ -258,8 +258,8 @@ mod tests {
         };
         let places = [[0.0; D], [0.5; D], std::array::from_fn(|d| 0.137 + 0.31 * d as f64)];
         for window in WINDOWS {
-            let table = Averaged::<D>::new(window, ratio);
-            let [a, b, c] = places.map(|x| sum(x, &|x| table.at(x)));
+            let table = AveragedWindow::<D>::new(window, ratio);
+            let [a, b, c] = places.map(|x| sum(x, &|x| table.value_at(x)));
             // rounding of some thousand additions
             assert!((b / a - 1.0).abs() < 1e-12 && (c / a - 1.0).abs() < 1e-12, "{window:?} {a} {b} {c}");
         }
@@ -282,13 +282,13 @@ mod tests {
     #[test]
     fn weights_of_every_bond_sum_to_the_same() {
         for ratio in [3.015, 4.015, 6.015] {
-            let table = Averaged::<3>::new(StressWindow::Ball, ratio);
+            let table = AveragedWindow::<3>::new(StressWindow::Ball, ratio);
             let shares = table.cells();
             assert!((shares.iter().map(|s| s.1).sum::<f64>() - 1.0).abs() < 1e-13);
             let far = ratio as i32 + 3;
             let whole: f64 = (-far..=far)
                 .flat_map(|x| (-far..=far).flat_map(move |y| (-far..=far).map(move |z| [x, y, z])))
-                .map(|p| table.at(p.map(f64::from)))
+                .map(|p| table.value_at(p.map(f64::from)))
                 .sum();
             let stencil = Stencil::<3>::new(ratio);
             let step = if ratio > 4.5 { 29 } else { 7 };

@@ -90,7 +90,7 @@ fn sever<const D: usize>(bonds: &mut CloudBonds<D>, mut choose: impl FnMut(usize
             }
         });
     }
-    bonds.sever(&list);
+    bonds.break_bonds(&list);
 }
 
 /// Names a bond from both of its ends.

@@ -7,7 +7,7 @@ use peri::field::Field;
 use peri::material::BondMaterial;
 use peri::potential::{BondPotential, Law};
 use peri::solver::{Breaking, Loads, Method, Policy, State, StepRecord, System, VelocityVerlet};
-use peri::stress::{BallVolume, Loaded, Missing, StressMeasure, piola_on_lattice};
+use peri::stress::{BallVolume, StressInput, StressMeasure, SurfaceCompensation, piola_on_lattice};
 use std::f64::consts::PI;
 
 pub const DENSITY: f64 = 2.3;
@@ -337,7 +337,12 @@ fn rigid_rotation() {
         force(bonds, &u, &mut out);
         let each = bonds.particles().iter().map(|&s| norm(out.get(s as usize)));
         largest = largest.max(each.fold(0.0, f64::max) / stiffness);
-        let loaded = Loaded { displacement: &u, fit: &fit, modulus: MODULUS, missing: Missing::Bonds };
+        let loaded = StressInput {
+            displacement: &u,
+            fit: &fit,
+            modulus: MODULUS,
+            missing: SurfaceCompensation::Bonds,
+        };
         for measure in [StressMeasure::Hardy, StressMeasure::BallShare, StressMeasure::OnePoint] {
             let piola = piola_on_lattice(bonds, &loaded, measure, BallVolume::Particles);
             let each = piola.iter().flatten().flatten().map(|p| p.abs());

@@ -5,7 +5,7 @@ use crate::bodies::{Body, Built, ContactPair, MODULUS, Random, fit, norm, scatte
 use peri::bonds::{BodyGeometry, BondDamage, BondForces, Overstretched};
 use peri::geometry::{Operation, Shape};
 use peri::potential::{BondPotential, KernelFit, Law};
-use peri::stress::{BallVolume, Loaded, Missing, StressMeasure, StressTensor};
+use peri::stress::{BallVolume, StressInput, StressMeasure, StressTensor, SurfaceCompensation};
 use peri::stress::{piola_in_cloud, piola_on_lattice, segment_fraction};
 
 const ALL: [StressMeasure; 6] = [
@@ -36,10 +36,10 @@ fn on_lattice<const D: usize>(
     fit: &KernelFit,
     u: &[[f64; D]],
     measure: StressMeasure,
-    missing: Missing,
+    missing: SurfaceCompensation,
 ) -> Vec<StressTensor<D>> {
     let field = scatter(built.lattice.sites(), &built.on_lattice, u);
-    let state = Loaded { displacement: &field, fit, modulus: MODULUS, missing };
+    let state = StressInput { displacement: &field, fit, modulus: MODULUS, missing };
     piola_on_lattice(&built.lattice, &state, measure, BallVolume::Particles)
 }
 
@@ -59,7 +59,7 @@ fn patch<const D: usize>(ratio: f64, cells: [usize; D], measures: &[StressMeasur
     let built = body.build();
     let u = strained(&built.points);
     let (_, fit) = linear([0.9, 1.1]);
-    let one_point = on_lattice(&built, &fit, &u, StressMeasure::OnePoint, Missing::Bonds);
+    let one_point = on_lattice(&built, &fit, &u, StressMeasure::OnePoint, SurfaceCompensation::Bonds);
     let whole = |x: &[f64; D]| {
         (0..D).all(|d| x[d] > ratio && x[d] < cells[d] as f64 - ratio)
             && norm::<D>(std::array::from_fn(|d| x[d] - centre[d])) > ratio + 2.6
@@ -68,7 +68,7 @@ fn patch<const D: usize>(ratio: f64, cells: [usize; D], measures: &[StressMeasur
     let exact = one_point[inside];
     let mut of_hardy = f64::NAN;
     for &measure in measures {
-        let found = on_lattice(&built, &fit, &u, measure, Missing::Bonds);
+        let found = on_lattice(&built, &fit, &u, measure, SurfaceCompensation::Bonds);
         // looking one cell far, it finds no bond of some types at corners and at the steps of a hole
         let narrow = measure == StressMeasure::LehoucqSilling;
         let by_one_edge = |x: &[f64; D]| {
@@ -84,7 +84,7 @@ fn patch<const D: usize>(ratio: f64, cells: [usize; D], measures: &[StressMeasur
         assert!(worst < 1e-13, "{D}D, m = {ratio}, {}: {worst:e}", measure.name());
     }
     // what the old weights miss by: the check can fail
-    let old = on_lattice(&built, &fit, &u, StressMeasure::BallShare, Missing::Bonds)[inside];
+    let old = on_lattice(&built, &fit, &u, StressMeasure::BallShare, SurfaceCompensation::Bonds)[inside];
     assert!(apart(&old, &exact) > 1e-3 * size(&exact));
     of_hardy
 }
@@ -108,17 +108,17 @@ fn rows_below_a_free_edge() {
     let built = Body::<2>::solid([41, 30], 1.0, 3.015).build();
     let u: Vec<[f64; 2]> = built.points.iter().map(|x| [1e-6 * x[0], -1e-6 / 3.0 * x[1]]).collect();
     let (_, fit) = linear([0.99, 1.01]);
-    let rows = |measure: StressMeasure, missing: Missing| -> Vec<f64> {
+    let rows = |measure: StressMeasure, missing: SurfaceCompensation| -> Vec<f64> {
         let found = on_lattice(&built, &fit, &u, measure, missing);
         let exact = on_lattice(&built, &fit, &u, StressMeasure::OnePoint, missing)[41 * 15 + 20][0][0];
         (0..4).map(|row| found[41 * row + 20][0][0] / exact).collect()
     };
     let table = [
-        (StressMeasure::OnePoint, Missing::Bonds, [0.801, 0.956, 1.0, 1.0]),
-        (StressMeasure::BallShare, Missing::Bonds, [0.879, 0.943, 0.949, 0.977]),
-        (StressMeasure::HardyScaled, Missing::Window, [0.897, 0.962, 0.968, 0.995]),
-        (StressMeasure::HardyScaled, Missing::Bonds, [1.0; 4]),
-        (StressMeasure::Hardy, Missing::Bonds, [1.0; 4]),
+        (StressMeasure::OnePoint, SurfaceCompensation::Bonds, [0.801, 0.956, 1.0, 1.0]),
+        (StressMeasure::BallShare, SurfaceCompensation::Bonds, [0.879, 0.943, 0.949, 0.977]),
+        (StressMeasure::HardyScaled, SurfaceCompensation::Window, [0.897, 0.962, 0.968, 0.995]),
+        (StressMeasure::HardyScaled, SurfaceCompensation::Bonds, [1.0; 4]),
+        (StressMeasure::Hardy, SurfaceCompensation::Bonds, [1.0; 4]),
     ];
     for (measure, missing, expected) in table {
         for (found, expected) in rows(measure, missing).iter().zip(expected) {
@@ -129,7 +129,7 @@ fn rows_below_a_free_edge() {
     // one row marked: it alone is taken by its window
     let mut marked = vec![false; built.lattice.sites()];
     built.on_lattice[..41].iter().for_each(|&site| marked[site] = true);
-    let mixed = rows(StressMeasure::HardyScaled, Missing::WindowAt(&marked));
+    let mixed = rows(StressMeasure::HardyScaled, SurfaceCompensation::WindowAt(&marked));
     assert!((mixed[0] - 0.897).abs() < 6e-4 && (mixed[1] - 1.0).abs() < 1e-12, "{mixed:?}");
 }
 
@@ -150,7 +150,7 @@ fn a_broken_bond_counts_with_no_force() {
         std::array::from_fn(|a| std::array::from_fn(|b| force * zeta[a] * pair.bond[b]));
     for measure in ALL {
         let mut broken = body.build();
-        let before = on_lattice(&broken, &fit, &u, measure, Missing::Bonds);
+        let before = on_lattice(&broken, &fit, &u, measure, SurfaceCompensation::Bonds);
         let (i, j) = (broken.on_lattice[pair.i], broken.on_lattice[pair.j]);
         let mut ends = Vec::new();
         for (own, other) in [(i, j), (j, i)] {
@@ -162,8 +162,8 @@ fn a_broken_bond_counts_with_no_force() {
                 }
             });
         }
-        broken.lattice.sever(&ends);
-        let after = on_lattice(&broken, &fit, &u, measure, Missing::Bonds);
+        broken.lattice.break_bonds(&ends);
+        let after = on_lattice(&broken, &fit, &u, measure, SurfaceCompensation::Bonds);
         let mut lost = [[0.0; 2]; 2];
         for (before, after) in before.iter().zip(&after) {
             for a in 0..2 {
@@ -187,7 +187,12 @@ fn clouds_share_bonds_out() {
     for measure in [StressMeasure::Hardy, StressMeasure::Gaussian, StressMeasure::Spline] {
         let of = |u: &[[f64; 2]], measure: StressMeasure| {
             let field = scatter(built.cloud.sites(), &built.in_cloud, u);
-            let state = Loaded { displacement: &field, fit: &fit, modulus: MODULUS, missing: Missing::Bonds };
+            let state = StressInput {
+                displacement: &field,
+                fit: &fit,
+                modulus: MODULUS,
+                missing: SurfaceCompensation::Bonds,
+            };
             piola_in_cloud(&built.cloud, &state, measure, BallVolume::Particles)
         };
         let inside = built.in_cloud[25 * 11 + 12];
@@ -291,14 +296,15 @@ fn measures_are_their_definitions() {
     for particle in [29 * 14 + 14, 29 * 12 + 17] {
         let at = built.points[particle];
         for (measure, window) in windows {
-            let found = on_lattice(&built, &fit, &u, measure, Missing::Bonds)[particle];
+            let found = on_lattice(&built, &fit, &u, measure, SurfaceCompensation::Bonds)[particle];
             let exact = by_definition(&pairs, &built.points, &*law, &u, at, 48, &|x| averaged(window, x));
             // both sample the window at sixteenths of a cell; the ball's rim is observed to about 1e-3 of its
             // area
             let bound = 2e-3 * size(&exact);
             assert!(apart(&found, &exact) < bound, "{measure:?}: {found:?} against {exact:?}");
         }
-        let found = on_lattice(&built, &fit, &u, StressMeasure::LehoucqSilling, Missing::Bonds)[particle];
+        let found =
+            on_lattice(&built, &fit, &u, StressMeasure::LehoucqSilling, SurfaceCompensation::Bonds)[particle];
         let exact = by_definition(&pairs, &built.points, &*law, &u, at, 960, &hat);
         // midpoint rules of 1/16 a cell on curves of at most second degree in α
         assert!(apart(&found, &exact) < 1e-3 * size(&exact), "{found:?} against {exact:?}");
@@ -353,7 +359,7 @@ fn rows_do_not_reach_into_each_other() {
         assert_eq!(narrow.points, wide.points);
         let u = Random(11).vectors(narrow.points.len(), 0.1);
         for measure in ALL {
-            let of = |built: &Built<2>| on_lattice(built, &fit, &u, measure, Missing::Bonds);
+            let of = |built: &Built<2>| on_lattice(built, &fit, &u, measure, SurfaceCompensation::Bonds);
             for (a, b) in of(&narrow).iter().zip(&of(&wide)) {
                 assert!(apart(a, b) <= 1e-14 * size(a), "m = {ratio}, {measure:?}: {a:?} {b:?}");
             }
@@ -370,7 +376,7 @@ fn bits_do_not_depend_on_threads() {
     let (_, fit) = linear([0.5, 2.0]);
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| ALL.map(|measure| on_lattice(&built, &fit, &u, measure, Missing::Bonds)))
+        pool.install(|| ALL.map(|measure| on_lattice(&built, &fit, &u, measure, SurfaceCompensation::Bonds)))
     };
     assert!(with(1) == with(3));
 }

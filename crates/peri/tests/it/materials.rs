@@ -189,7 +189,7 @@ impl<'a, 'm, const D: usize> Case<'a, 'm, D> {
             });
         }
         assert!(!list.is_empty());
-        self.bonds.sever(&list);
+        self.bonds.break_bonds(&list);
         let at = self.displacement.clone();
         let before = self.forces(&at);
         let away = self.moved(lone, 0, 0.3 * self.bonds.spacing());

@@ -124,7 +124,7 @@ fn a_law_of_the_caller() {
         simulation.solve(Lbfgs::default()).unwrap();
         simulation
     };
-    let (ours, theirs) = (torn(Rubber::of_law(Springs(0.7), 1e6)), torn(Rubber::new(Law::Linear, 1e6)));
+    let (ours, theirs) = (torn(Rubber::with_law(Springs(0.7), 1e6)), torn(Rubber::new(Law::Linear, 1e6)));
     assert!(theirs.state.fracture.broken > 0);
     assert_eq!(ours.bonds.intact(), theirs.bonds.intact());
     let peak = theirs.history().iter().map(|record| record.load.abs()).fold(0.0, f64::max);
@@ -133,7 +133,7 @@ fn a_law_of_the_caller() {
         let allowed = 1e-8 * b.load.abs() + 1e-8 * peak;
         assert!((a.load - b.load).abs() <= allowed, "{} {}", a.load, b.load);
     }
-    let slack = Model::new(sheet(), Rubber::of_law(Springs(0.0), 1e6)).build();
+    let slack = Model::new(sheet(), Rubber::with_law(Springs(0.0), 1e6)).build();
     let message = slack.err().map(|error| error.to_string()).unwrap_or_default();
     assert!(message.starts_with("t′(1) of the bond law: found 0"), "{message}");
 }

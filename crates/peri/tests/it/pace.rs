@@ -68,7 +68,7 @@ fn tightness<const D: usize, M: Material<D> + 'static>(
                 let mut random = Random(5);
                 let list = some(&bonds, broken, &mut random);
                 let response = material().respond(&bonds);
-                bonds.sever(&list);
+                bonds.break_bonds(&list);
                 let mut state = State::new(bonds.sites());
                 let lateral = stretch.powf(-across);
                 for &site in bonds.particles() {

@@ -102,7 +102,7 @@ impl<const D: usize> Block<D> {
                 }
             });
         }
-        self.bonds.sever(&list);
+        self.bonds.break_bonds(&list);
     }
 
     /// The largest differences of f, F, W and I from the program's, over the largest of each; ΣE over all
@@ -438,7 +438,7 @@ fn kernels_are_plain_loops<const D: usize>(space: Space, side: usize, volume: Vo
             });
         }
         list.sort_by_key(|bond| bond.site);
-        bonds.sever(&list);
+        bonds.break_bonds(&list);
         let mut found = Vec::new();
         for material in [&mut fast, &mut plain] {
             material.prepare(&bonds, &displacement);
@@ -502,7 +502,7 @@ fn a_broken_bond_releases_its_energy() {
             length: 1.0,
             weight: 1.0,
         };
-        bonds.sever(&[entry(site, bond.index), entry(bond.site, count - 1 - bond.index)]);
+        bonds.break_bonds(&[entry(site, bond.index), entry(bond.site, count - 1 - bond.index)]);
         let released = before - states.energy(&bonds, &displacement, StretchRange::REST);
         (released / said - 1.0).abs()
     }

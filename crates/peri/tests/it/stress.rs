@@ -7,7 +7,9 @@ use peri::calibrate::{Space, modulus, poisson_ratio};
 use peri::field::Field;
 use peri::geometry::lattice;
 use peri::potential::{BondPotential, Law};
-use peri::stress::{BallVolume, Loaded, Missing, StressMeasure, StressTensor, ball_volume, segment_fraction};
+use peri::stress::{
+    BallVolume, StressInput, StressMeasure, StressTensor, SurfaceCompensation, ball_volume, segment_fraction,
+};
 use peri::stress::{cauchy, deformation_gradients, piola_in_cloud, piola_on_lattice};
 
 /// Strain at which tables of the linear theory are compared: the bonds' own nonlinearity is of this order, so
@@ -40,12 +42,13 @@ fn measured<const D: usize>(
     let modulus = modulus(space(D), 1.0, ratio, 1.0);
     let diagonal = |p: StressTensor<D>| [p[0][0] / STRAIN, p[1][1] / STRAIN];
     let field = scatter(built.lattice.sites(), &built.on_lattice, &u);
-    let state = Loaded { displacement: &field, fit: &fit, modulus, missing: Missing::Bonds };
+    let state = StressInput { displacement: &field, fit: &fit, modulus, missing: SurfaceCompensation::Bonds };
     let stress = piola_on_lattice(&built.lattice, &state, measure, ball);
     let mut results = vec![("lattice", diagonal(stress[particle]))];
     if cloud {
         let field = scatter(built.cloud.sites(), &built.in_cloud, &u);
-        let state = Loaded { displacement: &field, fit: &fit, modulus, missing: Missing::Bonds };
+        let state =
+            StressInput { displacement: &field, fit: &fit, modulus, missing: SurfaceCompensation::Bonds };
         let stress = piola_in_cloud(&built.cloud, &state, measure, ball);
         results.push(("cloud", diagonal(stress[built.in_cloud[particle]])));
     }
@@ -300,10 +303,20 @@ fn check_definition<const D: usize>(cells: [usize; D], ratio: f64) {
     let law = Law::ChainOffset.build(720.0, 1200.0, false).unwrap();
     let fit = fit(&*law, stretch_range(&pairs, &u));
     let field = scatter(built.lattice.sites(), &built.on_lattice, &u);
-    let state = Loaded { displacement: &field, fit: &fit, modulus: MODULUS, missing: Missing::Bonds };
+    let state = StressInput {
+        displacement: &field,
+        fit: &fit,
+        modulus: MODULUS,
+        missing: SurfaceCompensation::Bonds,
+    };
     let on_lattice = piola_on_lattice(&built.lattice, &state, StressMeasure::BallShare, BallVolume::Whole);
     let field = scatter(built.cloud.sites(), &built.in_cloud, &u);
-    let state = Loaded { displacement: &field, fit: &fit, modulus: MODULUS, missing: Missing::Bonds };
+    let state = StressInput {
+        displacement: &field,
+        fit: &fit,
+        modulus: MODULUS,
+        missing: SurfaceCompensation::Bonds,
+    };
     let in_cloud = piola_in_cloud(&built.cloud, &state, StressMeasure::BallShare, BallVolume::Whole);
     let size = |p: &StressTensor<D>| p.iter().flatten().map(|x| x * x).sum::<f64>().sqrt();
     let scale = on_lattice.iter().map(size).fold(0.0, f64::max);
@@ -420,7 +433,12 @@ fn cauchy_stress_of_a_homogeneous_strain() {
         let field: Field<D> = scatter(built.lattice.sites(), &built.on_lattice, &u);
         let law = Law::ChainAffine.build(720.0, 1200.0, true).unwrap();
         let fit = fit(&*law, [0.5, 2.0]);
-        let state = Loaded { displacement: &field, fit: &fit, modulus: MODULUS, missing: Missing::Bonds };
+        let state = StressInput {
+            displacement: &field,
+            fit: &fit,
+            modulus: MODULUS,
+            missing: SurfaceCompensation::Bonds,
+        };
         let gradients = deformation_gradients::<D>(&built.lattice, &field);
         for f in &gradients {
             for a in 0..D {

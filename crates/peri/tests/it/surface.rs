@@ -8,7 +8,9 @@ use peri::correction::surface_factors;
 use peri::geometry::{Operation, Shape, lattice};
 use peri::potential::Law;
 use peri::solver::{DynamicRelaxation, Loads, State, Support};
-use peri::stress::{BallVolume, Loaded, Missing, StressMeasure, StressTensor, piola_on_lattice};
+use peri::stress::{
+    BallVolume, StressInput, StressMeasure, StressTensor, SurfaceCompensation, piola_on_lattice,
+};
 
 /// E ε/σ between (±400, 300) mm, and the largest σ11/σ beside the hole: hardy, one-point.
 fn plate(spacing: f64, volume: VolumeCorrection, surface: bool) -> [f64; 3] {
@@ -47,7 +49,12 @@ fn plate(spacing: f64, volume: VolumeCorrection, surface: bool) -> [f64; 3] {
     let length = bonds.position(right)[0] - bonds.position(left)[0];
     let strain = (state.displacement.get(right)[0] - state.displacement.get(left)[0]) / length;
     let fit = fit(&*law, state.stretches.fitted);
-    let loaded = Loaded { displacement: &state.displacement, fit: &fit, modulus, missing: Missing::Bonds };
+    let loaded = StressInput {
+        displacement: &state.displacement,
+        fit: &fit,
+        modulus,
+        missing: SurfaceCompensation::Bonds,
+    };
     let largest = |tensors: Vec<StressTensor<2>>| {
         // the two columns beside the axis, averaged row by row
         let mut rows = std::collections::BTreeMap::<i64, f64>::new();

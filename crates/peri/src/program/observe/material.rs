@@ -104,7 +104,7 @@ impl<const D: usize> BodyWithMaterial<D> {
         };
         if let Some(solid) = &spec.solid {
             let law = solid.build::<D>(source, space, scene.is_beside_planes())?;
-            let criterion = spec.critical.map(|critical| critical.of_solid(&*law, &*body.bonds));
+            let criterion = spec.critical.map(|critical| critical.solid_criterion(&*law, &*body.bonds));
             return Ok(Self {
                 criterion: criterion.transpose().map_err(fault)?,
                 material: SceneMaterial::Solid(NonlocalSolid(law)),
@@ -207,7 +207,7 @@ impl<const D: usize> Physics<D> {
         let held = scene::tied_grips(source, scene, &*body.bonds, &loads)?;
         if let Some(held) = &held {
             let list = crate::contact::across(&*body.bonds, held);
-            body.bonds.sever(&list);
+            body.bonds.break_bonds(&list);
         }
         let rows = rows(source, scene, &body)?;
         check_lines(source, scene, &*body.bonds)?;
@@ -245,10 +245,10 @@ impl<const D: usize> Physics<D> {
         self.plate = scene::exact_plate(source, scene, body)?;
         self.evaluator = match &own.material {
             SceneMaterial::Bonds(material) => {
-                StressEvaluator::of_bonds(material.clone(), scene.fit_bound(), breaks)
+                StressEvaluator::for_bonds(material.clone(), scene.fit_bound(), breaks)
             }
             SceneMaterial::Solid(solid) if scene.observes_forces() => {
-                StressEvaluator::of_solid(solid.0.clone(), scene.is_learnt(), bonds)
+                StressEvaluator::for_solid(solid.0.clone(), scene.is_learnt(), bonds)
             }
             _ => StressEvaluator::none(),
         };

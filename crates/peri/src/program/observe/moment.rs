@@ -7,7 +7,8 @@ use crate::potential::KernelFit;
 use crate::program::scene::Scene;
 use crate::solver::{State, StepRecord};
 use crate::stress::{
-    self, Loaded, MeasuredStress, Missing, StressMeasure, StressTensor, cauchy, deformation_gradients,
+    self, MeasuredStress, StressInput, StressMeasure, StressTensor, SurfaceCompensation, cauchy,
+    deformation_gradients,
 };
 use harness::observe::{Fields, Observer, Scalars};
 use harness::report::Phases;
@@ -121,8 +122,8 @@ impl<'a, const D: usize> Moment<'a, D> {
         let fit = KernelFit::new(material.law(), stretches, self.scene.fit_bound())?;
         let gradients =
             phases.time("deformation gradient", || deformation_gradients(bonds, &state.displacement));
-        let (modulus, missing) = (material.modulus(), Missing::WindowAt(&self.physics.by_window));
-        let loaded = Loaded { displacement: &state.displacement, fit: &fit, modulus, missing };
+        let (modulus, missing) = (material.modulus(), SurfaceCompensation::WindowAt(&self.physics.by_window));
+        let loaded = StressInput { displacement: &state.displacement, fit: &fit, modulus, missing };
         let measured = stress::piolas(bonds, &loaded, &spec.measures, spec.ball);
         for (&measure, MeasuredStress { piola, seconds }) in spec.measures.iter().zip(measured) {
             let started = Instant::now();

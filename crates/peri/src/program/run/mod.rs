@@ -251,7 +251,8 @@ fn solve<const D: usize>(
         Some(contact) => {
             let planes = contact.planes(source, scene.dynamics.is_some()).map_err(Failure::from)?;
             let whole = material.longitudinal_modulus(&*body.bonds);
-            let modulus = Property::new(&*body.bonds, |site, _| whole * physics.body.stiffness.at(site));
+            let modulus =
+                Property::new(&*body.bonds, |site, _| whole * physics.body.stiffness.value_at(site));
             let held = physics.held.as_deref();
             let tied = held.map(|held| (held, contact.tie_stiffness(scene.dynamics.is_some())));
             Some(contact.contact(planes, body, material.micromodulus(&*body.bonds), &modulus, tied)?)

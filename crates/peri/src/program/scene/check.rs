@@ -285,7 +285,7 @@ fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         }
     }
     if let Some(critical) = &material.critical {
-        let given = critical.given();
+        let given = critical.alternatives();
         if given.len() != 1 {
             let found = given.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(" and ");
             let found = if found.is_empty() { "none of them".to_owned() } else { found };

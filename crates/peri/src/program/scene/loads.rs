@@ -6,7 +6,7 @@ use super::values::Body;
 use super::{Boundary, ContactSpec, Method, Prescribed, PrescribedField, Scene, Side};
 use crate::field::Field;
 use crate::material::{BodyTensor, surface_load};
-use crate::solver::{Adrift, INVERTS, Loads, Stops, Support, adrift, inverted};
+use crate::solver::{ContactStops, INVERTS, Loads, Support, Unsupported, find_unsupported, inverted};
 use harness::scene::{SceneError, Source};
 
 /// Loads and supports of a body, and the sites where forces act on it, of loads or of holding.
@@ -175,15 +175,17 @@ fn balanced<const D: usize>(
     let planes =
         scene.contact.as_ref().map_or(Ok(Vec::new()), |contact| contact.planes::<D>(source, false))?;
     let normals = planes.iter().map(|plane| plane.normal).collect();
-    let stops = Stops {
+    let stops = ContactStops {
         normals,
         pairs: scene.contact.is_some(),
         rubs: scene.contact.as_ref().is_some_and(ContactSpec::rubs)
             || planes.iter().any(|plane| plane.bonded),
     };
-    let Some(part) = adrift(&*body.bonds, loads, None, &stops, scene.tolerance()) else { return Ok(()) };
-    let Adrift { particles, of, force, axis, .. } = &part;
-    let found = if particles == of {
+    let Some(part) = find_unsupported(&*body.bonds, loads, None, &stops, scene.tolerance()) else {
+        return Ok(());
+    };
+    let Unsupported { particles, total, force, axis, .. } = &part;
+    let found = if particles == total {
         format!("a total force of {force:.3e} N along {axis}, along which no displacement is prescribed")
     } else {
         part.to_string()

@@ -188,12 +188,12 @@ pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<
             }
         }
         let allowed = "either `stretch`, above 1, or `fracture_energy`, above 0";
-        let found = match (critical.given().len(), critical.stretch, critical.fracture_energy) {
+        let found = match (critical.alternatives().len(), critical.stretch, critical.fracture_energy) {
             (1, Some(stretch), _) if stretch > 1.0 && stretch.is_finite() => None,
             (1, _, Some(energy)) if energy.si() > 0.0 && energy.si().is_finite() => None,
             (1, Some(stretch), _) => Some(format!("a stretch of {}", plain(stretch))),
             (1, _, Some(energy)) => Some(format!("{} J/m²", plain(energy.si()))),
-            _ => Some(format!("`{}` of a solid", critical.given().join("` and `"))),
+            _ => Some(format!("`{}` of a solid", critical.alternatives().join("` and `"))),
         };
         if let Some(found) = found {
             return Err(source.error("material.critical", found, allowed));

@@ -6,13 +6,13 @@ mod space;
 mod stiffness;
 mod transfer;
 
-pub use stiffness::Survey;
+pub use stiffness::BondCounts;
 
 use crate::bonds::BodyGeometry;
 use crate::field::Field;
 use crate::potential::BondPotential;
 use crate::solver::load::Loads;
-use crate::solver::places::in_order;
+use crate::solver::particle_map::in_order;
 use factor::{Factor, Pattern};
 use polycore::numerics::bounds;
 use pulp::Arch;
@@ -42,7 +42,7 @@ pub struct CoarseBody<'a, const D: usize> {
     /// Stiffness density of each site, N/m⁵, that holds constrained components.
     pub springs: &'a [f64],
     /// Counts of the bonds.
-    pub survey: &'a Survey,
+    pub survey: &'a BondCounts,
     /// Faces held by rigid planes.
     pub anchors: &'a [PlaneAnchor<D>],
 }
@@ -82,7 +82,7 @@ impl<const D: usize> CoarseLevel<D> {
         let assembly = Assembly::new(bonds, loads, displacement, survey, law, springs, space.edge);
         let mut matrices: Vec<(ElementMatrix, [f64; CORNERS])> =
             space.elements.par_iter().map(|element| assembly.element(&space, element)).collect();
-        hold(&space, anchors, &mut matrices);
+        add_anchors(&space, anchors, &mut matrices);
         let extent = extent(body.bonds);
         let shift = SHIFT * assembly.stiffness() * (std::f64::consts::PI / extent).powi(2);
         let (pattern, blocks) = pattern::<D>(&space);
@@ -162,7 +162,7 @@ impl<const D: usize> CoarseLevel<D> {
 }
 
 /// Adds k φ_a φ_b n⊗n of anchors to the matrices of their elements.
-fn hold<const D: usize>(
+fn add_anchors<const D: usize>(
     space: &CoarseSpace<D>,
     anchors: &[PlaneAnchor<D>],
     matrices: &mut [(ElementMatrix, [f64; CORNERS])],

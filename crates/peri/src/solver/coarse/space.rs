@@ -176,7 +176,7 @@ impl<const D: usize> CoarseSpace<D> {
                 let filled = OccupiedCells::new(&grid, bonds, bonded, whole);
                 let mut functions = filled.nodes(&grid);
                 if (1..=most).contains(&functions) {
-                    let space = Self::on(&grid, filled, bonds);
+                    let space = Self::on_grid(&grid, filled, bonds);
                     functions = space.functions;
                     if functions <= most {
                         return Some(space);
@@ -192,7 +192,7 @@ impl<const D: usize> CoarseSpace<D> {
         None
     }
 
-    fn on(grid: &BackgroundGrid<D>, filled: OccupiedCells<D>, bonds: &dyn BodyGeometry<D>) -> Self {
+    fn on_grid(grid: &BackgroundGrid<D>, filled: OccupiedCells<D>, bonds: &dyn BodyGeometry<D>) -> Self {
         let (sites, cells) = (bonds.sites(), filled.is_whole.len());
         // connected parts around each node
         let nodes: usize = grid.node_counts().iter().product();

@@ -35,7 +35,7 @@ type GradientProducts = [[f64; SYMMETRIC]; PAIRS];
 pub type ElementMatrix = [[f64; 9]; PAIRS];
 
 /// Counts of all bonds before anything is built.
-pub struct Survey {
+pub struct BondCounts {
     /// Number of bonds of each site.
     pub bonded: Vec<u32>,
     /// The most bonds of any particle.
@@ -44,7 +44,7 @@ pub struct Survey {
     pub moved: f64,
 }
 
-impl Survey {
+impl BondCounts {
     /// Counts the bonds of every particle, and measures those of a lattice to the nearest particles.
     pub fn new<const D: usize>(bonds: &dyn Bonds<D>, displacement: &Field<D>) -> Self {
         let lattice = bonds.as_lattice();
@@ -94,7 +94,7 @@ impl Tangents {
         Self { low, step, nodes: (0..NODES).map(node).collect() }
     }
 
-    fn at(&self, e: f64) -> [f64; 2] {
+    fn value_at(&self, e: f64) -> [f64; 2] {
         self.nodes[(((e - self.low) / self.step).max(0.0).round() as usize).min(NODES - 1)]
     }
 }
@@ -104,7 +104,7 @@ pub struct Assembly<'a, const D: usize> {
     bonds: &'a dyn BodyGeometry<D>,
     loads: &'a Loads<D>,
     displacement: &'a Field<D>,
-    survey: &'a Survey,
+    survey: &'a BondCounts,
     tangents: Tangents,
     modulus: f64,
     /// Stiffness density M_I at constrained components, N/m⁵.
@@ -126,7 +126,7 @@ impl<'a, const D: usize> Assembly<'a, D> {
         bonds: &'a dyn BodyGeometry<D>,
         loads: &'a Loads<D>,
         displacement: &'a Field<D>,
-        survey: &'a Survey,
+        survey: &'a BondCounts,
         law: (&dyn BondPotential, [f64; 2], [f64; 2]),
         springs: &'a [f64],
         edge: [f64; D],
@@ -180,7 +180,7 @@ impl<'a, const D: usize> Assembly<'a, D> {
                 square += zeta[d] * zeta[d];
                 e += eta * (2.0 * bond.bond[d] + eta);
             }
-            let [along, across] = self.tangents.at(e / (bond.length * bond.length));
+            let [along, across] = self.tangents.value_at(e / (bond.length * bond.length));
             let factor = self.modulus * bond.weight / bond.length;
             let difference = (along - across) / square.max(f64::MIN_POSITIVE);
             let mut pair = 0;
@@ -260,7 +260,7 @@ impl<'a, const D: usize> Assembly<'a, D> {
                 contract::<D>(&mut matrix, &tangent, &own);
                 add_tangent(&mut sum, &tangent, volume);
             }
-            self.hold(&mut matrix, site, volume, &values);
+            self.add_springs(&mut matrix, site, volume, &values);
         }
         if let Some(shared) = &shared {
             contract::<D>(&mut matrix, shared, &products);
@@ -275,7 +275,7 @@ impl<'a, const D: usize> Assembly<'a, D> {
     }
 
     /// Adds the springs that hold constrained components.
-    fn hold(&self, matrix: &mut ElementMatrix, site: usize, volume: f64, values: &[f64; CORNERS]) {
+    fn add_springs(&self, matrix: &mut ElementMatrix, site: usize, volume: f64, values: &[f64; CORNERS]) {
         let constrained = self.loads.constrained(site);
         if constrained == 0 {
             return;

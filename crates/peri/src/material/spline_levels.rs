@@ -35,7 +35,7 @@ impl<const D: usize> SplineLevels<D> {
         let mut levels = Self { low: low.map(|x| x - 1.5 * width), width, grids: Vec::new() };
         let mut grid = SplineGrid::new(cells);
         for site in (0..cloud.sites()).filter(|&site| !inside[site]) {
-            levels.at(cells, cloud.position(site), |node, _| grid.weights[node] = 0.0);
+            levels.visit_splines(cells, cloud.position(site), |node, _| grid.weights[node] = 0.0);
         }
         loop {
             let coarse = grid.coarser();
@@ -57,7 +57,7 @@ impl<const D: usize> SplineLevels<D> {
         let (cells, mut values) = (finest.cells, std::mem::take(&mut finest.values));
         values.fill(Vector::zeros());
         for (site, residual) in residual.iter().enumerate() {
-            self.at(cells, cloud.position(site), |node, weight| values[node] += residual * weight);
+            self.visit_splines(cells, cloud.position(site), |node, weight| values[node] += residual * weight);
         }
         self.grids[0].values = values;
         for k in 1..self.grids.len() {
@@ -79,13 +79,15 @@ impl<const D: usize> SplineLevels<D> {
         }
         let (this, finest) = (&*self, &self.grids[0]);
         to.par_iter_mut().enumerate().for_each(|(site, to)| {
-            this.at(cells, cloud.position(site), |node, weight| *to += finest.values[node] * weight);
+            this.visit_splines(cells, cloud.position(site), |node, weight| {
+                *to += finest.values[node] * weight
+            });
         });
     }
 
     /// Visits the splines of the finest grid at a position.
     #[inline]
-    fn at(&self, cells: [usize; D], place: [f64; D], mut visit: impl FnMut(usize, f64)) {
+    fn visit_splines(&self, cells: [usize; D], place: [f64; D], mut visit: impl FnMut(usize, f64)) {
         let (mut first, mut stride, mut strides) = (0, 1, [0; D]);
         let mut weights = [[0.0; 3]; D];
         for d in 0..D {

@@ -6,8 +6,8 @@
 //! pairs are most of the memory traffic of an iteration, and a direction needs no more. All sums are in
 //! double precision.
 
+use super::particle_map::in_order;
 use super::passes::{LANES, sum};
-use super::places::in_order;
 use crate::field::{CHUNK, Field, chunk_range};
 use pulp::{Arch, NullaryFnOnce, Simd, WithSimd};
 use std::collections::VecDeque;
@@ -157,8 +157,8 @@ impl<const D: usize> LbfgsMemory<D> {
                     let y = &*change;
                     let mut add = |s: &[f32], w: &[f32], sums: &mut [f64]| {
                         let [wide_s, wide_w] = wide.each_mut().map(|wide| &mut wide[..y.len()]);
-                        arch.dispatch(Widen { from: s, to: &mut *wide_s });
-                        arch.dispatch(Widen { from: w, to: &mut *wide_w });
+                        arch.dispatch(ToDouble { from: s, to: &mut *wide_s });
+                        arch.dispatch(ToDouble { from: w, to: &mut *wide_w });
                         let products = arch.dispatch(PairProducts { s: wide_s, w: wide_w, y, g });
                         for k in 0..4 {
                             sums[k] += products[k];
@@ -207,12 +207,12 @@ fn chunks<const D: usize>(field: &mut Single<D>) -> Vec<[&mut [f32]; D]> {
 }
 
 /// Converts to double precision; sums that convert as they go are not vectorised.
-struct Widen<'a> {
+struct ToDouble<'a> {
     from: &'a [f32],
     to: &'a mut [f64],
 }
 
-impl NullaryFnOnce for Widen<'_> {
+impl NullaryFnOnce for ToDouble<'_> {
     type Output = ();
     #[inline(always)]
     fn call(self) {

@@ -21,7 +21,7 @@ struct SiteRun {
 
 /// Positions of particles in storage.
 #[derive(Default)]
-pub struct Places {
+pub struct ParticleMap {
     runs: Vec<SiteRun>,
     /// The runs of each work item, its first particle, and the number of particles at the end.
     items: Vec<Range<usize>>,
@@ -30,7 +30,7 @@ pub struct Places {
     held: Vec<(usize, u8)>,
 }
 
-impl Places {
+impl ParticleMap {
     /// Maps the particles of a body and its loads.
     pub fn new<const D: usize>(bonds: &dyn BodyGeometry<D>, loads: &Loads<D>) -> Self {
         let mut places = Self { first: vec![0], ..Self::default() };
@@ -55,7 +55,7 @@ impl Places {
     }
 
     /// Constrained particles of a range, with the bits of their components.
-    pub fn held(&self, particles: Range<usize>) -> &[(usize, u8)] {
+    pub fn constrained(&self, particles: Range<usize>) -> &[(usize, u8)] {
         let place = |particle: usize| self.held.partition_point(|held| held.0 < particle);
         &self.held[place(particles.start)..place(particles.end)]
     }
