@@ -15,7 +15,7 @@ use peri::material::BondMaterial;
 use peri::model::{self, Body, Model, Rubber};
 use peri::potential::Law;
 use peri::solver::{DynamicRelaxation, Lbfgs, State, Status, StepRecord, Support, VelocityVerlet};
-use peri::stress::{self, StressMeasure, StressTensor};
+use peri::stress::{self, StressMethod, StressTensor};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::collections::HashMap;
@@ -67,7 +67,7 @@ trait AnyBody: Send + Sync {
     fn displacements(&self) -> Vec<f64>;
     fn set_velocity(&mut self, velocity: &[f64]);
     fn history(&self) -> Vec<(&'static str, &'static str, Vec<f64>)>;
-    fn stress(&self, which: &str, measure: StressMeasure) -> Result<Vec<f64>, Error>;
+    fn stress(&self, which: &str, measure: StressMethod) -> Result<Vec<f64>, Error>;
     fn intact(&self) -> Vec<u32>;
     fn fragments(&self) -> usize;
     fn extend(&mut self, factors: Vec<f64>);
@@ -128,7 +128,7 @@ impl<const D: usize> AnyBody for Built<D> {
         StepRecord::SCALARS.map(|(name, unit, get)| (name, unit, rows.iter().map(get).collect())).to_vec()
     }
 
-    fn stress(&self, which: &str, measure: StressMeasure) -> Result<Vec<f64>, Error> {
+    fn stress(&self, which: &str, measure: StressMethod) -> Result<Vec<f64>, Error> {
         let flat = |tensors: Vec<StressTensor<D>>| tensors.into_iter().flatten().flatten().collect();
         Ok(match which {
             "piola" => flat(self.piola(measure)?),
@@ -243,8 +243,8 @@ impl Simulation {
         which: &str,
         measure: &str,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let known = StressMeasure::ALL.into_iter().find(|one| one.name() == measure).ok_or_else(|| {
-            let names: Vec<&str> = StressMeasure::ALL.iter().map(|one| one.name()).collect();
+        let known = StressMethod::ALL.into_iter().find(|one| one.name() == measure).ok_or_else(|| {
+            let names: Vec<&str> = StressMethod::ALL.iter().map(|one| one.name()).collect();
             value(format!("measure: found {measure:?}; allowed: {}", names.join(", ")))
         })?;
         let found =

@@ -4,7 +4,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use peri::bonds::{BodyGeometry, BondDamage, CloudBonds, VolumeCorrection, force};
 use peri::field::Field;
 use peri::potential::{KernelFit, Law};
-use peri::stress::{BallVolume, StressInput, StressMeasure, SurfaceCompensation, piola_in_cloud};
+use peri::stress::{BallVolume, StressInput, StressMethod, SurfaceCompensation, piola_in_cloud};
 
 mod kernel;
 
@@ -63,7 +63,7 @@ fn stress(criterion: &mut Criterion) {
     let fit = KernelFit::new(&*law, [0.5, 2.0], 1e-7);
     let fit = fit.unwrap_or_else(|error| panic!("{error}"));
     let mut group = criterion.benchmark_group("stress of a cloud");
-    for measure in [StressMeasure::Hardy, StressMeasure::Gaussian] {
+    for measure in [StressMethod::Hardy, StressMethod::Gaussian] {
         let state = StressInput {
             displacement: &displacement,
             fit: &fit,

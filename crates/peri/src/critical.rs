@@ -217,7 +217,7 @@ impl Critical {
             return fault(
                 "critical.strength",
                 strength.si(),
-                "nothing: bond laws have none, `[material.solid]` has",
+                "only with `[material.solid]`: bond laws have no strength",
             );
         }
         match (self.percent_over_contour, self.stretch, self.fracture_energy) {

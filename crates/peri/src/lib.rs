@@ -19,7 +19,7 @@
 //! simulation.solve(Lbfgs::default())?;
 //!
 //! // σ₁₁ in the middle: about E times 2 mm over the 34 mm between the grips
-//! let stress = simulation.cauchy(StressMeasure::Hardy)?;
+//! let stress = simulation.cauchy(StressMethod::Hardy)?;
 //! let middle = stress[stress.len() / 2 + 20][0][0];
 //! assert!((middle / 60e3 - 1.0).abs() < 0.1, "{middle} Pa");
 //! # Ok(())
@@ -36,8 +36,8 @@
 //!
 //! # Which module
 //!
-//! The modules below are the parts of [`model`]. Use them directly for clouds of particles ([`bonds`]), surface
-//! corrections ([`correction`]), your own material ([`material::Material`]) or bond law
+//! The modules below are the parts of [`model`]. Use them directly for clouds of particles ([`bonds`]),
+//! surface corrections ([`correction`]), your own material ([`material::Material`]) or bond law
 //! ([`potential::BondPotential`]), contact ([`contact`]), and results such as section forces and J-integrals
 //! ([`probe`]). All quantities are in SI units. The `peri` command line solves problems written as scenes
 //! (`program::scene`, feature `case`).

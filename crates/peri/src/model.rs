@@ -16,7 +16,7 @@ use crate::probe::StressEvaluator;
 use crate::solver::{
     Breaking, Loads, Method, Policy, RotatingRegion, Rotation, State, Status, StepRecord, Support, System,
 };
-use crate::stress::{self, BallVolume, StressInput, StressMeasure, StressTensor, SurfaceCompensation};
+use crate::stress::{self, BallVolume, StressInput, StressMethod, StressTensor, SurfaceCompensation};
 use std::sync::Arc;
 
 /// A material of a body: a [`Material`], or a description that becomes one in a body, such as [`Rubber`].
@@ -284,7 +284,7 @@ impl<const D: usize> Simulation<D, BondMaterial<'_>> {
     ///
     /// # Errors
     /// As [`KernelFit::new`].
-    pub fn piola(&self, measure: StressMeasure) -> Result<Vec<StressTensor<D>>, Error> {
+    pub fn piola(&self, measure: StressMethod) -> Result<Vec<StressTensor<D>>, Error> {
         let displacement = &self.state.displacement;
         let fit = KernelFit::new(self.material.law(), covered_stretches(&self.bonds, displacement), 1e-9)?;
         let (modulus, missing) = (self.material.modulus(), SurfaceCompensation::WindowAt(&self.loaded));
@@ -296,7 +296,7 @@ impl<const D: usize> Simulation<D, BondMaterial<'_>> {
     ///
     /// # Errors
     /// As [`Self::piola`].
-    pub fn cauchy(&self, measure: StressMeasure) -> Result<Vec<StressTensor<D>>, Error> {
+    pub fn cauchy(&self, measure: StressMethod) -> Result<Vec<StressTensor<D>>, Error> {
         let gradients = stress::deformation_gradients(&self.bonds, &self.state.displacement);
         Ok(stress::cauchy(&self.piola(measure)?, &gradients))
     }

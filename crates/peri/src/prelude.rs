@@ -8,4 +8,4 @@ pub use crate::material::{Correspondence, EightChainSolid, Material, NonlocalSol
 pub use crate::model::{Body, Model, Rubber, Simulation};
 pub use crate::potential::Law;
 pub use crate::solver::{DynamicRelaxation, Lbfgs, Method, Rotation, Support, VelocityVerlet};
-pub use crate::stress::StressMeasure;
+pub use crate::stress::StressMethod;

@@ -1,4 +1,4 @@
-//! The program `peri`: scenes in TOML, their runs, the command line. The only room of this crate that knows of them.
+//! The program `peri`: scenes in TOML, their runs, the command line. No other module of this crate uses them.
 
 pub mod bridge;
 pub mod command;

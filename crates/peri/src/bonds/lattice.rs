@@ -1,5 +1,4 @@
-//! A regular lattice of particles: one stencil of offsets, a bit mask of intact bonds per particle, no
-//! neighbour list.
+//! A regular lattice: one stencil of offsets, a bit mask of intact bonds per particle, no neighbour list.
 
 mod connect;
 mod mixed;
@@ -40,8 +39,7 @@ pub struct LatticeBonds<const D: usize> {
     factors: Option<Field<D>>,
     /// True if the factors are equal along all axes.
     even: bool,
-    /// Interior value of the factors, included in every stencil bond's weight; stored factors are relative to
-    /// it.
+    /// Interior value of the factors, part of each bond's weight; stored factors are relative to it.
     interior_factor: f64,
     kernel: Option<Box<dyn LatticeKernel<D>>>,
     /// A law that only a table represents, and kθ.
@@ -55,9 +53,8 @@ impl<const D: usize> LatticeBonds<D> {
     /// Bonds all occupied cells within `ratio` spacings, except pairs that cross a cut.
     ///
     /// # Errors
-    /// [`Error::Geometry`] if no cell is occupied, the list of occupied cells does not fit the box, the
-    /// spacing is not positive, the horizon is not finite or reaches no neighbour, or memory does not
-    /// suffice.
+    /// [`Error::Geometry`] if no cell is occupied, the list of cells does not fit the box, the spacing is not
+    /// positive, the horizon is not finite or reaches no neighbour, or memory does not suffice.
     pub fn new(
         lattice: Lattice<D>,
         ratio: f64,

@@ -131,7 +131,11 @@ impl<const D: usize> ContactList<D> {
 
     /// Rebuilds the list if pairs outside it may have come near since it was made.
     pub fn update(&mut self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) {
-        if !self.vicinity.as_mut().is_some_and(|vicinity| vicinity.holds(bonds.particles(), displacement)) {
+        if !self
+            .vicinity
+            .as_mut()
+            .is_some_and(|vicinity| vicinity.is_current(bonds.particles(), displacement))
+        {
             self.rebuild(bonds, displacement);
         }
     }

@@ -23,9 +23,9 @@
 //! stays there. Force and energy are finite at full overlap (r = 0: kd along the reference ξ; energy ½kd² V_I
 //! V_J), so larger loads press particles through each other.
 //!
-//! Planes act on faces, see `faces`. Friction is Coulomb's with an elastic slip, see `friction_pair`: equal and
-//! opposite within a pair, but not along it. Particles have no spin, so friction does not conserve angular
-//! momentum.
+//! Planes act on faces, see `faces`. Friction is Coulomb's with an elastic slip, see `friction_pair`: equal
+//! and opposite within a pair, but not along it. Particles have no spin, so friction does not conserve
+//! angular momentum.
 
 mod faces;
 mod friction;
@@ -324,7 +324,8 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Rebuilds the list for a displacement; required after bonds change other than by [`Self::add_broken_pairs`].
+    /// Rebuilds the list for a displacement; required after bonds change other than by
+    /// [`Self::add_broken_pairs`].
     pub fn rebuild(&mut self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) {
         self.list.rebuild(bonds, displacement);
         if let Some(planes) = &mut self.planes {

@@ -89,7 +89,8 @@ impl<const D: usize> Planes<D> {
     /// Places planes at rest beside a body; `modulus` is M, Pa, and `radius` that of a particle, m.
     ///
     /// # Errors
-    /// [`Error::Parameter`] as for [`RigidPlane`]; [`Error::Geometry`] for a bonded plane that touches no face.
+    /// [`Error::Parameter`] as for [`RigidPlane`]; [`Error::Geometry`] for a bonded plane that touches no
+    /// face.
     pub fn new(
         bonds: &dyn Bonds<D>,
         surface: &BodySurface<D>,

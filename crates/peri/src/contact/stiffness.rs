@@ -43,8 +43,8 @@ impl<const D: usize> Contact<D> {
     /// Adds contacts, present or imminent, to the Gershgorin sums of dynamic relaxation, in units of
     /// `tangent`: Σ_J k V_J (1 + max_{d≠e} |n_d n_e|), and planes. A particle that became heavy only in
     /// contact would enter another as a light one and leave as a heavy one, and so on indefinitely. A
-    /// particle without bonds has twice the sum: it starts each step from rest, see [`Contact::stop_detached`], and
-    /// must not go farther than a gradient step.
+    /// particle without bonds has twice the sum: it starts each step from rest, see
+    /// [`Contact::stop_detached`], and must not go farther than a gradient step.
     pub fn add_stiffness(
         &self,
         bonds: &dyn BodyGeometry<D>,

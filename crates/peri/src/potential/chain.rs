@@ -267,7 +267,8 @@ mod tests {
             prop_assert!((force - here.force).abs() < 1e-6 * here.force.max(1e-3 * here.energy / stretch));
             let stiffness = (right.force - left.force) / width;
             let scale = here.stiffness.abs() + here.force / stretch;
-            prop_assert!((stiffness - here.stiffness).abs() < 1e-6 * scale, "{} {}", stiffness, here.stiffness);
+            let error = (stiffness - here.stiffness).abs();
+            prop_assert!(error < 1e-6 * scale, "{} {}", stiffness, here.stiffness);
         }
     }
 }

@@ -96,11 +96,12 @@ impl Criterion {
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Policy {
-    /// Checks in equilibrium: all overstretched bonds break at once, and a new equilibrium is sought until none is
-    /// left. Independent of the method.
+    /// Checks in equilibrium: all overstretched bonds break at once, and a new equilibrium is sought until
+    /// none is left. Independent of the method.
     #[default]
     AtEquilibrium,
-    /// Checks in every iteration of dynamic relaxation: cheaper, but breaks bonds that an overshoot stretches.
+    /// Checks in every iteration of dynamic relaxation: cheaper, but breaks bonds that an overshoot
+    /// stretches.
     EachIteration,
 }
 

@@ -61,9 +61,8 @@ fn passing<const D: usize>(bonds: &dyn BodyGeometry<D>, loads: &Loads<D>, factor
                 let at: Vec<String> = at.iter().map(|x| format!("{:.4}", x * 1e3)).collect();
                 let [own, other] = [own, other].map(|u| u.map(|x| format!("{:.4}", x * 1e3)).join(", "));
                 return Some(format!(
-                    "prescribed displacements of ({own}) mm and ({other}) mm: from load factor {factor:.4} on \
-                    the two regions pass \
-                     through each other at X = ({}) mm",
+                    "prescribed displacements of ({own}) mm and ({other}) mm: from load factor \
+                     {factor:.4} on the two regions pass through each other at X = ({}) mm",
                     at.join(", ")
                 ));
             }

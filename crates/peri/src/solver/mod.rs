@@ -50,7 +50,7 @@ pub use method::{Method, StepCallback, Watch};
 pub use motion::{DynamicEnergies, EqualSteps, Motion, StepLimits};
 pub use record::{Status, StepRecord};
 pub use rotation::{RotatingRegion, Rotation};
-pub use state::{BodyStretches, Counts, Residuals, State};
+pub use state::{BodyStretches, Counts, ForceResiduals, State};
 pub use step_control::StepControl;
 pub use system::{LoadCurve, StateObserver, System};
 pub use unsupported::{ContactStops, Unsupported, find_unsupported};

@@ -18,7 +18,8 @@ pub struct Motion {
     pub energies: DynamicEnergies,
     /// Stretches at the last check.
     pub(super) look: StretchLook,
-    /// Stiffness control of materials whose stiffness depends on the displacement, see [`super::stiffness_control`].
+    /// Stiffness control of materials whose stiffness depends on the displacement, see
+    /// [`super::stiffness_control`].
     pub(super) pace: StiffnessControl,
 }
 

@@ -26,7 +26,7 @@ pub struct State<const D: usize> {
     /// Stretches of the body, and of the fitted law.
     pub stretches: BodyStretches,
     /// Out-of-balance forces and their references.
-    pub convergence: Residuals,
+    pub convergence: ForceResiduals,
     /// Broken and softened bonds.
     pub fracture: Fracture,
     /// Friction and moving planes.
@@ -119,7 +119,7 @@ impl Default for BodyStretches {
 
 /// Forces out of balance over their reference.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Residuals {
+pub struct ForceResiduals {
     /// Residual of the last iteration.
     pub residual: f64,
     /// Greatest reference force of an equilibrium.
@@ -160,7 +160,7 @@ impl<const D: usize> State<D> {
             step: 0,
             counts: Counts::default(),
             stretches: BodyStretches::default(),
-            convergence: Residuals::default(),
+            convergence: ForceResiduals::default(),
             fracture: Fracture::default(),
             contact: ContactState::default(),
             control: StepControl::default(),

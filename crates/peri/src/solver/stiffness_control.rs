@@ -1,14 +1,14 @@
 //! Length of explicit steps for solids, whose stiffness depends on the displacement: it grows with every
 //! stretch, under compression, and when bonds break.
 //!
-//! m, [`crate::material::SolverMaterial::frequency_bound`], bounds ρω² of a state at the cost of at most a force.
-//! The Lanczos iteration gives ω² itself and with it the ratio r = ρω²/m; between two of them ω² is estimated
-//! as r m/ρ. Steps are those of [`MARGIN`] times that. m is checked at the end of a step, before its forces
-//! act: a step whose end would have required a shorter one, such as one that crushes a particle, is undone
-//! and cut, so that no kick follows from it. Checks follow every step in which bonds broke or strains may
-//! have changed by [`STRAIN`], and are otherwise the rarer the slower m grows; ω² is measured again if m or
-//! the stretches have changed much, since r changes with the stretches. All this follows from the state
-//! alone.
+//! m, [`crate::material::SolverMaterial::frequency_bound`], bounds ρω² of a state at the cost of at most a
+//! force. The Lanczos iteration gives ω² itself and with it the ratio r = ρω²/m; between two of them ω² is
+//! estimated as r m/ρ. Steps are those of [`MARGIN`] times that. m is checked at the end of a step, before
+//! its forces act: a step whose end would have required a shorter one, such as one that crushes a particle,
+//! is undone and cut, so that no kick follows from it. Checks follow every step in which bonds broke or
+//! strains may have changed by [`STRAIN`], and are otherwise the rarer the slower m grows; ω² is measured
+//! again if m or the stretches have changed much, since r changes with the stretches. All this follows from
+//! the state alone.
 
 use super::motion::StiffnessControl;
 use super::state::State;

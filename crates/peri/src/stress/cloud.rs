@@ -2,7 +2,7 @@
 
 use super::window::{StressWindow, bond_function};
 use super::{
-    BallVolume, StressInput, StressMeasure, StressTensor, ball_volume, force_over_length, segment_fraction,
+    BallVolume, StressInput, StressMethod, StressTensor, ball_volume, force_over_length, segment_fraction,
 };
 use crate::bonds::{BodyGeometry, CellGrid, CloudBonds, Neighbour, Stencil};
 use pulp::{Arch, NullaryFnOnce};
@@ -11,7 +11,7 @@ use rayon::prelude::*;
 pub fn piola<const D: usize>(
     bonds: &CloudBonds<D>,
     state: &StressInput<D>,
-    measure: StressMeasure,
+    measure: StressMethod,
     ball: BallVolume,
 ) -> Vec<StressTensor<D>> {
     let points: Vec<[f64; D]> = bonds.particles().iter().map(|&s| bonds.position(s as usize)).collect();
@@ -29,7 +29,7 @@ pub fn piola<const D: usize>(
 fn in_balls<const D: usize>(
     bonds: &CloudBonds<D>,
     state: &StressInput<D>,
-    (measure, ball): (StressMeasure, BallVolume),
+    (measure, ball): (StressMethod, BallVolume),
     points: &[[f64; D]],
     grid: &CellGrid<D>,
 ) -> Vec<StressTensor<D>> {
@@ -37,7 +37,7 @@ fn in_balls<const D: usize>(
     let square = radius * radius;
     let whole = ball_volume(D, radius) * bonds.thickness();
     let filled: Vec<f64> = match (measure, ball) {
-        (StressMeasure::BallShare, BallVolume::Particles | BallVolume::Cells) => {
+        (StressMethod::BallShare, BallVolume::Particles | BallVolume::Cells) => {
             // as for bonds: a distance equal to the horizon counts, whatever the rounding
             let reach = radius * (1.0 + 1e-9);
             let inside: Vec<f64> = points
@@ -81,7 +81,7 @@ fn in_balls<const D: usize>(
                 }
             });
         };
-        let volume = if measure == StressMeasure::OnePoint {
+        let volume = if measure == StressMethod::OnePoint {
             add(site, &|_, _, _| 0.5);
             bonds.volume(site)
         } else {
@@ -94,8 +94,8 @@ fn in_balls<const D: usize>(
                 let nearer = |p, q, other| (norm(p), own) < (norm(q), other);
                 add(own, &|p, q, other| match measure {
                     // either end finds such a bond: half of its ½ from each
-                    StressMeasure::AsPublished if norm(p) < square && norm(q) < square => 0.25,
-                    StressMeasure::AsPublished => 0.0,
+                    StressMethod::AsPublished if norm(p) < square && norm(q) < square => 0.25,
+                    StressMethod::AsPublished => 0.0,
                     _ if nearer(p, q, other) => segment_fraction(p, q, square),
                     _ => 0.0,
                 });

@@ -5,7 +5,7 @@ use super::bond_forces::forces;
 use super::convolution::{OffsetBonds, ShareSums, Tap, tiles};
 use super::window::{AveragedWindow, StressWindow, normalise};
 use super::{
-    BallVolume, MeasuredStress, StressInput, StressMeasure, ball_volume, cell_fractions, segment_fraction,
+    BallVolume, MeasuredStress, StressInput, StressMethod, ball_volume, cell_fractions, segment_fraction,
 };
 use crate::bonds::{BodyGeometry, LatticeBonds};
 use rayon::prelude::*;
@@ -14,7 +14,7 @@ use std::time::Instant;
 
 /// Sums of a measure, and their run time.
 struct StressSums<const D: usize> {
-    measure: StressMeasure,
+    measure: StressMethod,
     window: Option<AveragedWindow<D>>,
     /// Taps of each bond of half the stencil.
     taps: Vec<Vec<Tap>>,
@@ -23,7 +23,7 @@ struct StressSums<const D: usize> {
 }
 
 impl<const D: usize> StressSums<D> {
-    fn new(bonds: &LatticeBonds<D>, state: &StressInput<D>, measure: StressMeasure) -> Self {
+    fn new(bonds: &LatticeBonds<D>, state: &StressInput<D>, measure: StressMethod) -> Self {
         let started = Instant::now();
         let window = measure
             .is_partition()
@@ -57,7 +57,7 @@ fn half<const D: usize>(bonds: &LatticeBonds<D>) -> &[[i32; D]] {
 pub fn piolas<const D: usize>(
     bonds: &LatticeBonds<D>,
     state: &StressInput<D>,
-    measures: &[StressMeasure],
+    measures: &[StressMethod],
     ball: BallVolume,
 ) -> Vec<MeasuredStress<D>> {
     let mut all: Vec<StressSums<D>> =
@@ -116,13 +116,13 @@ fn bond_function<const D: usize>(
 fn taps<const D: usize>(
     bonds: &LatticeBonds<D>,
     offset: [i32; D],
-    measure: StressMeasure,
+    measure: StressMethod,
     window: Option<&AveragedWindow<D>>,
     alike: &mut EquivalentOffsets<D>,
 ) -> Vec<Tap> {
     let weights = match (measure, window) {
-        (StressMeasure::OnePoint, _) => vec![([0; D], 0.5), (offset.map(|o| -o), 0.5)],
-        (StressMeasure::HardyScaled, _) => {
+        (StressMethod::OnePoint, _) => vec![([0; D], 0.5), (offset.map(|o| -o), 0.5)],
+        (StressMethod::HardyScaled, _) => {
             let mut weights = crossing(bonds.ratio(), offset, measure);
             normalise(&mut weights);
             weights
@@ -135,7 +135,7 @@ fn taps<const D: usize>(
 
 /// Start of bonds that cross the ball about a particle, and the fraction inside (as printed: ½ with both ends
 /// there).
-fn crossing<const D: usize>(ratio: f64, offset: [i32; D], measure: StressMeasure) -> Vec<([i32; D], f64)> {
+fn crossing<const D: usize>(ratio: f64, offset: [i32; D], measure: StressMethod) -> Vec<([i32; D], f64)> {
     let square = ratio * ratio;
     let reach = 2 * ratio.ceil() as i32;
     let side = (2 * reach + 1) as usize;
@@ -146,8 +146,8 @@ fn crossing<const D: usize>(ratio: f64, offset: [i32; D], measure: StressMeasure
             let q = std::array::from_fn(|d| p[d] + f64::from(offset[d]));
             let norm = |x: [f64; D]| x.iter().map(|c| c * c).sum::<f64>();
             let weight = match measure {
-                StressMeasure::AsPublished if norm(p) < square && norm(q) < square => 0.5,
-                StressMeasure::AsPublished => 0.0,
+                StressMethod::AsPublished if norm(p) < square && norm(q) < square => 0.5,
+                StressMethod::AsPublished => 0.0,
                 _ => segment_fraction(p, q, square),
             };
             (weight > 0.0).then_some((start, weight))
@@ -156,10 +156,10 @@ fn crossing<const D: usize>(ratio: f64, offset: [i32; D], measure: StressMeasure
 }
 
 /// Sites near a surface whose windows lack bonds, if existing bonds compensate for them.
-fn rim<const D: usize>(bonds: &LatticeBonds<D>, state: &StressInput<D>, measure: StressMeasure) -> Vec<u32> {
+fn rim<const D: usize>(bonds: &LatticeBonds<D>, state: &StressInput<D>, measure: StressMethod) -> Vec<u32> {
     let wanted = |site: usize| match measure {
-        StressMeasure::HardyBonds => true,
-        StressMeasure::HardyWindow => false,
+        StressMethod::HardyBonds => true,
+        StressMethod::HardyWindow => false,
         _ => measure.is_partition() && !state.missing.is_window(site),
     };
     // no bond that crosses a window begins farther away
@@ -186,7 +186,7 @@ fn rim<const D: usize>(bonds: &LatticeBonds<D>, state: &StressInput<D>, measure:
 fn volumes<const D: usize>(
     bonds: &LatticeBonds<D>,
     state: &StressInput<D>,
-    measure: StressMeasure,
+    measure: StressMethod,
     ball: BallVolume,
     window: Option<&AveragedWindow<D>>,
 ) -> Vec<f64> {
@@ -199,16 +199,16 @@ fn volumes<const D: usize>(
         offsets.iter().copied().chain([[0; D]]).map(|o| (o, share)).collect::<Vec<_>>()
     };
     let (cells, volume) = match (measure, ball, window) {
-        (StressMeasure::BallShare, BallVolume::Particles, _) => (sites(), whole),
-        (StressMeasure::BallShare, BallVolume::Cells, _) => (cell_fractions::<D>(bonds.ratio()), whole),
-        (StressMeasure::OnePoint, ..) => (Vec::new(), lattice.volume),
-        (StressMeasure::HardyScaled, ..) => (sites(), lattice.volume),
+        (StressMethod::BallShare, BallVolume::Particles, _) => (sites(), whole),
+        (StressMethod::BallShare, BallVolume::Cells, _) => (cell_fractions::<D>(bonds.ratio()), whole),
+        (StressMethod::OnePoint, ..) => (Vec::new(), lattice.volume),
+        (StressMethod::HardyScaled, ..) => (sites(), lattice.volume),
         (_, _, Some(window)) => (window.cells(), lattice.volume),
         _ => (Vec::new(), whole),
     };
     let shared = |site: usize| match measure {
-        StressMeasure::HardyWindow => true,
-        StressMeasure::HardyBonds => false,
+        StressMethod::HardyWindow => true,
+        StressMethod::HardyBonds => false,
         _ => !measure.is_partition() || state.missing.is_window(site),
     };
     shares(bonds, &cells, shared).into_iter().map(|s| s * volume).collect()

@@ -29,7 +29,7 @@ pub type StressTensor<const D: usize> = [[f64; D]; D];
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
-pub enum StressMeasure {
+pub enum StressMethod {
     /// All bonds crossing the ball, by the fraction inside, averaged over the particle's cell: weights that
     /// sum to 1 for every bond offset; [`SurfaceCompensation`] treats surfaces.
     #[default]
@@ -59,7 +59,7 @@ pub enum StressMeasure {
     Constitutive,
 }
 
-impl StressMeasure {
+impl StressMethod {
     /// All measures of bond forces.
     pub const ALL: [Self; 10] = [
         Self::Hardy,
@@ -125,7 +125,7 @@ impl SurfaceCompensation<'_> {
     }
 }
 
-/// Volume Ω of the averaging ball inside the body, for [`StressMeasure::BallShare`].
+/// Volume Ω of the averaging ball inside the body, for [`StressMethod::BallShare`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
@@ -166,15 +166,15 @@ pub struct MeasuredStress<const D: usize> {
 pub fn piolas<const D: usize>(
     bonds: &dyn Bonds<D>,
     state: &StressInput<D>,
-    measures: &[StressMeasure],
+    measures: &[StressMethod],
     ball: BallVolume,
 ) -> Vec<MeasuredStress<D>> {
     if let BondKind::Lattice(lattice) = bonds.kind()
-        && !measures.contains(&StressMeasure::Constitutive)
+        && !measures.contains(&StressMethod::Constitutive)
     {
         return lattice::piolas(lattice, state, measures, ball);
     }
-    let one = |&measure: &StressMeasure| {
+    let one = |&measure: &StressMethod| {
         let started = Instant::now();
         let piola = piola(bonds, state, measure, ball);
         MeasuredStress { piola, seconds: started.elapsed().as_secs_f64() }
@@ -187,7 +187,7 @@ pub fn piolas<const D: usize>(
 pub fn piola<const D: usize>(
     bonds: &dyn Bonds<D>,
     state: &StressInput<D>,
-    measure: StressMeasure,
+    measure: StressMethod,
     ball: BallVolume,
 ) -> Vec<StressTensor<D>> {
     match bonds.kind() {
@@ -201,10 +201,10 @@ pub fn piola<const D: usize>(
 pub fn piola_on_lattice<const D: usize>(
     bonds: &LatticeBonds<D>,
     state: &StressInput<D>,
-    measure: StressMeasure,
+    measure: StressMethod,
     ball: BallVolume,
 ) -> Vec<StressTensor<D>> {
-    if measure == StressMeasure::Constitutive {
+    if measure == StressMethod::Constitutive {
         return vec![[[f64::NAN; D]; D]; bonds.particles().len()];
     }
     lattice::piolas(bonds, state, &[measure], ball).swap_remove(0).piola
@@ -216,14 +216,14 @@ pub fn piola_on_lattice<const D: usize>(
 /// A cloud has neither common offsets of bonds nor cells: a measure whose weights sum to 1 distributes every
 /// bond over the particles whose windows it crosses, by volume × bond function, so that the sum of P V is
 /// that of f ⊗ ξ over all bonds; [`StressInput::missing`] has no effect. Measures that need a lattice
-/// ([`StressMeasure::needs_lattice`]) are treated as [`StressMeasure::Hardy`]; scenes refuse them.
+/// ([`StressMethod::needs_lattice`]) are treated as [`StressMethod::Hardy`]; scenes refuse them.
 pub fn piola_in_cloud<const D: usize>(
     bonds: &CloudBonds<D>,
     state: &StressInput<D>,
-    measure: StressMeasure,
+    measure: StressMethod,
     ball: BallVolume,
 ) -> Vec<StressTensor<D>> {
-    if measure == StressMeasure::Constitutive {
+    if measure == StressMethod::Constitutive {
         return vec![[[f64::NAN; D]; D]; bonds.particles().len()];
     }
     cloud::piola(bonds, state, measure, ball)

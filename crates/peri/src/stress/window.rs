@@ -1,6 +1,6 @@
 //! Localisation functions φ of Hardy's stress, Eqs (2.15)–(2.18), averaged over a particle's cell.
 
-use super::{StressMeasure, segment_fraction};
+use super::{StressMethod, segment_fraction};
 use rayon::prelude::*;
 
 /// Standard deviation of the Gaussian window over its cut-off radius.
@@ -21,11 +21,11 @@ pub enum StressWindow {
 
 impl StressWindow {
     /// Window of a measure that is a sum over bonds with a bond function.
-    pub fn for_measure(measure: StressMeasure) -> Self {
+    pub fn for_measure(measure: StressMethod) -> Self {
         match measure {
-            StressMeasure::Gaussian => Self::Gaussian,
-            StressMeasure::Spline => Self::Spline,
-            StressMeasure::LehoucqSilling => Self::Cell,
+            StressMethod::Gaussian => Self::Gaussian,
+            StressMethod::Spline => Self::Spline,
+            StressMethod::LehoucqSilling => Self::Cell,
             _ => Self::Ball,
         }
     }

@@ -7,7 +7,7 @@ use peri::field::Field;
 use peri::material::BondMaterial;
 use peri::potential::{BondPotential, Law};
 use peri::solver::{Breaking, Loads, Method, Policy, State, StepRecord, System, VelocityVerlet};
-use peri::stress::{BallVolume, StressInput, StressMeasure, SurfaceCompensation, piola_on_lattice};
+use peri::stress::{BallVolume, StressInput, StressMethod, SurfaceCompensation, piola_on_lattice};
 use std::f64::consts::PI;
 
 pub const DENSITY: f64 = 2.3;
@@ -343,7 +343,7 @@ fn rigid_rotation() {
             modulus: MODULUS,
             missing: SurfaceCompensation::Bonds,
         };
-        for measure in [StressMeasure::Hardy, StressMeasure::BallShare, StressMeasure::OnePoint] {
+        for measure in [StressMethod::Hardy, StressMethod::BallShare, StressMethod::OnePoint] {
             let piola = piola_on_lattice(bonds, &loaded, measure, BallVolume::Particles);
             let each = piola.iter().flatten().flatten().map(|p| p.abs());
             stress = stress.max(each.fold(0.0, f64::max) / youngs);

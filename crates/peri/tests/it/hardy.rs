@@ -5,16 +5,16 @@ use crate::bodies::{Body, Built, ContactPair, MODULUS, Random, fit, norm, scatte
 use peri::bonds::{BodyGeometry, BondDamage, BondForces, Overstretched};
 use peri::geometry::{Operation, Shape};
 use peri::potential::{BondPotential, KernelFit, Law};
-use peri::stress::{BallVolume, StressInput, StressMeasure, StressTensor, SurfaceCompensation};
+use peri::stress::{BallVolume, StressInput, StressMethod, StressTensor, SurfaceCompensation};
 use peri::stress::{piola_in_cloud, piola_on_lattice, segment_fraction};
 
-const ALL: [StressMeasure; 6] = [
-    StressMeasure::Hardy,
-    StressMeasure::HardyBonds,
-    StressMeasure::HardyScaled,
-    StressMeasure::Gaussian,
-    StressMeasure::Spline,
-    StressMeasure::LehoucqSilling,
+const ALL: [StressMethod; 6] = [
+    StressMethod::Hardy,
+    StressMethod::HardyBonds,
+    StressMethod::HardyScaled,
+    StressMethod::Gaussian,
+    StressMethod::Spline,
+    StressMethod::LehoucqSilling,
 ];
 
 fn size<const D: usize>(p: &StressTensor<D>) -> f64 {
@@ -35,7 +35,7 @@ fn on_lattice<const D: usize>(
     built: &Built<D>,
     fit: &KernelFit,
     u: &[[f64; D]],
-    measure: StressMeasure,
+    measure: StressMethod,
     missing: SurfaceCompensation,
 ) -> Vec<StressTensor<D>> {
     let field = scatter(built.lattice.sites(), &built.on_lattice, u);
@@ -51,7 +51,7 @@ fn strained<const D: usize>(points: &[[f64; D]]) -> Vec<[f64; D]> {
 
 /// In a body with a hole every particle, at edges, corners and the hole, has the stress that its own bonds
 /// give where none is missing; the greatest error by `hardy`.
-fn patch<const D: usize>(ratio: f64, cells: [usize; D], measures: &[StressMeasure]) -> f64 {
+fn patch<const D: usize>(ratio: f64, cells: [usize; D], measures: &[StressMethod]) -> f64 {
     let mut body = Body::<D>::solid(cells, 1.0, ratio);
     let far = 2.0 * ratio;
     let centre = cells.map(|c| c as f64 - far - 1.5);
@@ -59,7 +59,7 @@ fn patch<const D: usize>(ratio: f64, cells: [usize; D], measures: &[StressMeasur
     let built = body.build();
     let u = strained(&built.points);
     let (_, fit) = linear([0.9, 1.1]);
-    let one_point = on_lattice(&built, &fit, &u, StressMeasure::OnePoint, SurfaceCompensation::Bonds);
+    let one_point = on_lattice(&built, &fit, &u, StressMethod::OnePoint, SurfaceCompensation::Bonds);
     let whole = |x: &[f64; D]| {
         (0..D).all(|d| x[d] > ratio && x[d] < cells[d] as f64 - ratio)
             && norm::<D>(std::array::from_fn(|d| x[d] - centre[d])) > ratio + 2.6
@@ -70,7 +70,7 @@ fn patch<const D: usize>(ratio: f64, cells: [usize; D], measures: &[StressMeasur
     for &measure in measures {
         let found = on_lattice(&built, &fit, &u, measure, SurfaceCompensation::Bonds);
         // looking one cell far, it finds no bond of some types at corners and at the steps of a hole
-        let narrow = measure == StressMeasure::LehoucqSilling;
+        let narrow = measure == StressMethod::LehoucqSilling;
         let by_one_edge = |x: &[f64; D]| {
             let edges = (0..D).filter(|&d| x[d].min(cells[d] as f64 - x[d]) < ratio).count();
             edges < 2 && norm::<D>(std::array::from_fn(|d| x[d] - centre[d])) > ratio + 2.6
@@ -78,20 +78,20 @@ fn patch<const D: usize>(ratio: f64, cells: [usize; D], measures: &[StressMeasur
         let judged = built.points.iter().zip(&found).filter(|(x, _)| !narrow || by_one_edge(x));
         let worst = judged.map(|(_, p)| apart(p, &exact) / size(&exact)).fold(0.0, f64::max);
         // displacements of 1 are rounded to 1e-16, those of neighbours differ by 1e-2
-        if measure == StressMeasure::Hardy {
+        if measure == StressMethod::Hardy {
             of_hardy = worst;
         }
         assert!(worst < 1e-13, "{D}D, m = {ratio}, {}: {worst:e}", measure.name());
     }
     // what the old weights miss by: the check can fail
-    let old = on_lattice(&built, &fit, &u, StressMeasure::BallShare, SurfaceCompensation::Bonds)[inside];
+    let old = on_lattice(&built, &fit, &u, StressMethod::BallShare, SurfaceCompensation::Bonds)[inside];
     assert!(apart(&old, &exact) > 1e-3 * size(&exact));
     of_hardy
 }
 
 #[test]
 fn any_strain_is_exact_up_to_free_edges() {
-    let mut worst = patch::<3>(3.015, [19; 3], &[StressMeasure::Hardy, StressMeasure::LehoucqSilling]);
+    let mut worst = patch::<3>(3.015, [19; 3], &[StressMethod::Hardy, StressMethod::LehoucqSilling]);
     for ratio in [3.015, 4.015, 6.015, 8.015] {
         let side = (4.0 * ratio) as usize + 8;
         worst = worst.max(patch::<2>(ratio, [side, side + 3], &ALL));
@@ -108,17 +108,17 @@ fn rows_below_a_free_edge() {
     let built = Body::<2>::solid([41, 30], 1.0, 3.015).build();
     let u: Vec<[f64; 2]> = built.points.iter().map(|x| [1e-6 * x[0], -1e-6 / 3.0 * x[1]]).collect();
     let (_, fit) = linear([0.99, 1.01]);
-    let rows = |measure: StressMeasure, missing: SurfaceCompensation| -> Vec<f64> {
+    let rows = |measure: StressMethod, missing: SurfaceCompensation| -> Vec<f64> {
         let found = on_lattice(&built, &fit, &u, measure, missing);
-        let exact = on_lattice(&built, &fit, &u, StressMeasure::OnePoint, missing)[41 * 15 + 20][0][0];
+        let exact = on_lattice(&built, &fit, &u, StressMethod::OnePoint, missing)[41 * 15 + 20][0][0];
         (0..4).map(|row| found[41 * row + 20][0][0] / exact).collect()
     };
     let table = [
-        (StressMeasure::OnePoint, SurfaceCompensation::Bonds, [0.801, 0.956, 1.0, 1.0]),
-        (StressMeasure::BallShare, SurfaceCompensation::Bonds, [0.879, 0.943, 0.949, 0.977]),
-        (StressMeasure::HardyScaled, SurfaceCompensation::Window, [0.897, 0.962, 0.968, 0.995]),
-        (StressMeasure::HardyScaled, SurfaceCompensation::Bonds, [1.0; 4]),
-        (StressMeasure::Hardy, SurfaceCompensation::Bonds, [1.0; 4]),
+        (StressMethod::OnePoint, SurfaceCompensation::Bonds, [0.801, 0.956, 1.0, 1.0]),
+        (StressMethod::BallShare, SurfaceCompensation::Bonds, [0.879, 0.943, 0.949, 0.977]),
+        (StressMethod::HardyScaled, SurfaceCompensation::Window, [0.897, 0.962, 0.968, 0.995]),
+        (StressMethod::HardyScaled, SurfaceCompensation::Bonds, [1.0; 4]),
+        (StressMethod::Hardy, SurfaceCompensation::Bonds, [1.0; 4]),
     ];
     for (measure, missing, expected) in table {
         for (found, expected) in rows(measure, missing).iter().zip(expected) {
@@ -129,7 +129,7 @@ fn rows_below_a_free_edge() {
     // one row marked: it alone is taken by its window
     let mut marked = vec![false; built.lattice.sites()];
     built.on_lattice[..41].iter().for_each(|&site| marked[site] = true);
-    let mixed = rows(StressMeasure::HardyScaled, SurfaceCompensation::WindowAt(&marked));
+    let mixed = rows(StressMethod::HardyScaled, SurfaceCompensation::WindowAt(&marked));
     assert!((mixed[0] - 0.897).abs() < 6e-4 && (mixed[1] - 1.0).abs() < 1e-12, "{mixed:?}");
 }
 
@@ -184,8 +184,8 @@ fn clouds_share_bonds_out() {
     let (_, fit) = linear([0.5, 2.0]);
     let strained = strained(&built.points);
     let shaken = Random(5).vectors(built.points.len(), 0.1);
-    for measure in [StressMeasure::Hardy, StressMeasure::Gaussian, StressMeasure::Spline] {
-        let of = |u: &[[f64; 2]], measure: StressMeasure| {
+    for measure in [StressMethod::Hardy, StressMethod::Gaussian, StressMethod::Spline] {
+        let of = |u: &[[f64; 2]], measure: StressMethod| {
             let field = scatter(built.cloud.sites(), &built.in_cloud, u);
             let state = StressInput {
                 displacement: &field,
@@ -196,13 +196,13 @@ fn clouds_share_bonds_out() {
             piola_in_cloud(&built.cloud, &state, measure, BallVolume::Particles)
         };
         let inside = built.in_cloud[25 * 11 + 12];
-        let (found, exact) = (of(&strained, measure)[inside], of(&strained, StressMeasure::OnePoint)[inside]);
+        let (found, exact) = (of(&strained, measure)[inside], of(&strained, StressMethod::OnePoint)[inside]);
         // m = 3: bonds touch balls, whose fractions are rounded to √ε
         assert!(apart(&found, &exact) < 1e-7 * size(&exact), "{measure:?}: {found:?} {exact:?}");
         let total = |all: Vec<StressTensor<2>>| -> StressTensor<2> {
             std::array::from_fn(|a| std::array::from_fn(|b| all.iter().map(|p| p[a][b]).sum()))
         };
-        let (found, exact) = (total(of(&shaken, measure)), total(of(&shaken, StressMeasure::OnePoint)));
+        let (found, exact) = (total(of(&shaken, measure)), total(of(&shaken, StressMethod::OnePoint)));
         assert!(apart(&found, &exact) < 1e-11 * size(&exact), "{measure:?}: {found:?} {exact:?}");
     }
 }
@@ -287,8 +287,8 @@ fn measures_are_their_definitions() {
     let (_, built, pairs, u) = smooth();
     let law = Law::ChainOffset.build(720.0, 1200.0, false).unwrap();
     let fit = fit(&*law, stretch_range(&pairs, &u));
-    let windows: [(StressMeasure, Shape2); 3] =
-        [(StressMeasure::Hardy, ball), (StressMeasure::Gaussian, gaussian), (StressMeasure::Spline, spline)];
+    let windows: [(StressMethod, Shape2); 3] =
+        [(StressMethod::Hardy, ball), (StressMethod::Gaussian, gaussian), (StressMethod::Spline, spline)];
     let averaged = |window: Shape2, x: [f64; 2]| {
         let shift = |k: usize| (k as f64 + 0.5) / 16.0 - 0.5;
         (0..256).map(|k| window([x[0] + shift(k % 16), x[1] + shift(k / 16)])).sum::<f64>() / 256.0
@@ -304,7 +304,7 @@ fn measures_are_their_definitions() {
             assert!(apart(&found, &exact) < bound, "{measure:?}: {found:?} against {exact:?}");
         }
         let found =
-            on_lattice(&built, &fit, &u, StressMeasure::LehoucqSilling, SurfaceCompensation::Bonds)[particle];
+            on_lattice(&built, &fit, &u, StressMethod::LehoucqSilling, SurfaceCompensation::Bonds)[particle];
         let exact = by_definition(&pairs, &built.points, &*law, &u, at, 960, &hat);
         // midpoint rules of 1/16 a cell on curves of at most second degree in α
         assert!(apart(&found, &exact) < 1e-3 * size(&exact), "{found:?} against {exact:?}");

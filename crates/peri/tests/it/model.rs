@@ -11,7 +11,7 @@ use peri::potential::{BondPotential, Law};
 use peri::solver::{
     Breaking, DynamicRelaxation, Lbfgs, Loads, Method, Policy, State, Support, System, VelocityVerlet,
 };
-use peri::stress::StressMeasure;
+use peri::stress::StressMethod;
 
 const CRACK: [[f64; 2]; 2] = [[0.0, 20e-3], [8e-3, 20e-3]];
 
@@ -64,7 +64,7 @@ fn a_model_is_its_parts() {
     assert!(seen >= 3 && simulation.history().len() == 3);
     let particles = bonds.particles().len();
     assert_eq!(simulation.displacements().count(), particles);
-    let stress = simulation.cauchy(StressMeasure::Hardy).unwrap();
+    let stress = simulation.cauchy(StressMethod::Hardy).unwrap();
     assert!(stress.len() == particles && stress.iter().flatten().flatten().all(|x| x.is_finite()));
 }
 

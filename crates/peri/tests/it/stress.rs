@@ -8,7 +8,7 @@ use peri::field::Field;
 use peri::geometry::lattice;
 use peri::potential::{BondPotential, Law};
 use peri::stress::{
-    BallVolume, StressInput, StressMeasure, StressTensor, SurfaceCompensation, ball_volume, segment_fraction,
+    BallVolume, StressInput, StressMethod, StressTensor, SurfaceCompensation, ball_volume, segment_fraction,
 };
 use peri::stress::{cauchy, deformation_gradients, piola_in_cloud, piola_on_lattice};
 
@@ -33,7 +33,7 @@ fn measured<const D: usize>(
     built: &Built<D>,
     ratio: f64,
     particle: usize,
-    measure: StressMeasure,
+    measure: StressMethod,
     ball: BallVolume,
     cloud: bool,
 ) -> Vec<(&'static str, [f64; 2])> {
@@ -81,13 +81,13 @@ fn check_patch<const D: usize>(ratio: f64, cloud: bool) {
     let (built, middle) = patch::<D>(ratio);
     // the whole ball lies in the body: every reading of its volume but the cells' (64 slices in 3D) is exact
     let rows = [
-        (StressMeasure::AsPublished, BallVolume::Whole, [printed, f64::NAN]),
-        (StressMeasure::BallShare, BallVolume::Whole, [hardy, hardy_22]),
-        (StressMeasure::BallShare, BallVolume::Particles, [hardy, hardy_22]),
-        (StressMeasure::OnePoint, BallVolume::Particles, [one_point, one_point_22]),
+        (StressMethod::AsPublished, BallVolume::Whole, [printed, f64::NAN]),
+        (StressMethod::BallShare, BallVolume::Whole, [hardy, hardy_22]),
+        (StressMethod::BallShare, BallVolume::Particles, [hardy, hardy_22]),
+        (StressMethod::OnePoint, BallVolume::Particles, [one_point, one_point_22]),
     ];
     for (measure, ball, expected) in rows {
-        if ball == BallVolume::Particles && measure == StressMeasure::BallShare && !cloud {
+        if ball == BallVolume::Particles && measure == StressMethod::BallShare && !cloud {
             continue; // long, and the same sums as over the whole ball
         }
         for (path, found) in measured(&built, ratio, middle, measure, ball, cloud) {
@@ -100,7 +100,7 @@ fn check_patch<const D: usize>(ratio: f64, cloud: bool) {
             }
             if (D, ratio, ball) == (2, 3.015, BallVolume::Whole) {
                 match measure {
-                    StressMeasure::AsPublished => {
+                    StressMethod::AsPublished => {
                         evidence::near(
                             "patch test, m = 3, share of the stress as printed",
                             found[0],
@@ -142,7 +142,7 @@ fn patch_test_in_space_at_a_large_horizon() {
     let built = Body::<3>::solid([13; 3], 1.0, ratio).build();
     let middle = built.points.len() / 2;
     let expected = PATCH[6].2;
-    for (path, found) in measured(&built, ratio, middle, StressMeasure::OnePoint, BallVolume::Whole, true) {
+    for (path, found) in measured(&built, ratio, middle, StressMethod::OnePoint, BallVolume::Whole, true) {
         assert!((found[0] - expected[2]).abs() < TOLERANCE, "{path}: {found:?}");
         assert!((found[1] - expected[4]).abs() < TOLERANCE, "{path}: {found:?}");
     }
@@ -185,9 +185,9 @@ fn check_surface<const D: usize>(ratio: f64, depth: usize, cells_tolerance: f64,
             std::array::from_fn(|d| if d == 1 { cells[1] as f64 - 0.5 - row as f64 } else { middle });
         let particle = built.points.iter().position(|x| *x == at).unwrap();
         let balls = [
-            (StressMeasure::BallShare, BallVolume::Whole, TOLERANCE),
-            (StressMeasure::BallShare, BallVolume::Cells, TOLERANCE + cells_tolerance),
-            (StressMeasure::OnePoint, BallVolume::Whole, TOLERANCE),
+            (StressMethod::BallShare, BallVolume::Whole, TOLERANCE),
+            (StressMethod::BallShare, BallVolume::Cells, TOLERANCE + cells_tolerance),
+            (StressMethod::OnePoint, BallVolume::Whole, TOLERANCE),
         ];
         for ((measure, ball, tolerance), e) in balls.into_iter().zip(expected) {
             // a cloud has no cells
@@ -247,7 +247,7 @@ fn ball_inside_thin_bodies() {
                     &built,
                     ratio * 0.1,
                     particle,
-                    StressMeasure::BallShare,
+                    StressMethod::BallShare,
                     BallVolume::Particles,
                     true,
                 );
@@ -309,7 +309,7 @@ fn check_definition<const D: usize>(cells: [usize; D], ratio: f64) {
         modulus: MODULUS,
         missing: SurfaceCompensation::Bonds,
     };
-    let on_lattice = piola_on_lattice(&built.lattice, &state, StressMeasure::BallShare, BallVolume::Whole);
+    let on_lattice = piola_on_lattice(&built.lattice, &state, StressMethod::BallShare, BallVolume::Whole);
     let field = scatter(built.cloud.sites(), &built.in_cloud, &u);
     let state = StressInput {
         displacement: &field,
@@ -317,7 +317,7 @@ fn check_definition<const D: usize>(cells: [usize; D], ratio: f64) {
         modulus: MODULUS,
         missing: SurfaceCompensation::Bonds,
     };
-    let in_cloud = piola_in_cloud(&built.cloud, &state, StressMeasure::BallShare, BallVolume::Whole);
+    let in_cloud = piola_in_cloud(&built.cloud, &state, StressMethod::BallShare, BallVolume::Whole);
     let size = |p: &StressTensor<D>| p.iter().flatten().map(|x| x * x).sum::<f64>().sqrt();
     let scale = on_lattice.iter().map(size).fold(0.0, f64::max);
     let step = if D == 2 { 1 } else { 5 };
@@ -448,7 +448,7 @@ fn cauchy_stress_of_a_homogeneous_strain() {
                 }
             }
         }
-        let nominal = piola_on_lattice(&built.lattice, &state, StressMeasure::OnePoint, BallVolume::Whole);
+        let nominal = piola_on_lattice(&built.lattice, &state, StressMethod::OnePoint, BallVolume::Whole);
         let sigma = cauchy(&nominal, &gradients);
         for s in &sigma {
             for a in 0..D {

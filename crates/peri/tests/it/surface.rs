@@ -9,7 +9,7 @@ use peri::geometry::{Operation, Shape, lattice};
 use peri::potential::Law;
 use peri::solver::{DynamicRelaxation, Loads, State, Support};
 use peri::stress::{
-    BallVolume, StressInput, StressMeasure, StressTensor, SurfaceCompensation, piola_on_lattice,
+    BallVolume, StressInput, StressMethod, StressTensor, SurfaceCompensation, piola_on_lattice,
 };
 
 /// E ε/σ between (±400, 300) mm, and the largest σ11/σ beside the hole: hardy, one-point.
@@ -66,9 +66,8 @@ fn plate(spacing: f64, volume: VolumeCorrection, surface: bool) -> [f64; 3] {
         }
         rows.values().copied().fold(0.0, f64::max)
     };
-    let hardy = largest(piola_on_lattice(&bonds, &loaded, StressMeasure::BallShare, BallVolume::Particles));
-    let one_point =
-        largest(piola_on_lattice(&bonds, &loaded, StressMeasure::OnePoint, BallVolume::Particles));
+    let hardy = largest(piola_on_lattice(&bonds, &loaded, StressMethod::BallShare, BallVolume::Particles));
+    let one_point = largest(piola_on_lattice(&bonds, &loaded, StressMethod::OnePoint, BallVolume::Particles));
     eprintln!(
         "dx = {spacing}, {volume:?}, surface {surface}: strain {:.4}, hardy {hardy:.3}, one-point {one_point:.3}, {} its",
         strain / stress,

@@ -5,11 +5,11 @@ use crate::error::Error;
 use crate::exact::{HoleComparison, HoleRegion};
 use crate::program::quantities as q;
 use crate::program::scene::{ExactSpec, Scene};
-use crate::stress::StressMeasure;
+use crate::stress::StressMethod;
 use harness::observe::{Curve, Observer, Scalars};
 
 /// σ₁₁/σ∞ by each measure.
-type Normals = Vec<(StressMeasure, Vec<f64>)>;
+type Normals = Vec<(StressMethod, Vec<f64>)>;
 
 /// Comparison with the closed form of a scene: peak and profile at θ = π/2, errors over regions.
 pub(super) struct Exact<'s> {
@@ -26,7 +26,7 @@ impl<'s> Exact<'s> {
         self.found.as_ref().map(|(hole, _)| hole)
     }
 
-    fn normal(&self, measure: StressMeasure) -> Option<(&HoleComparison, &[f64])> {
+    fn normal(&self, measure: StressMethod) -> Option<(&HoleComparison, &[f64])> {
         let (hole, fields) = self.found.as_ref()?;
         fields.iter().find(|(own, _)| *own == measure).map(|(_, normal)| (hole, &normal[..]))
     }

@@ -7,7 +7,7 @@ use crate::potential::KernelFit;
 use crate::program::scene::Scene;
 use crate::solver::{State, StepRecord};
 use crate::stress::{
-    self, MeasuredStress, StressInput, StressMeasure, StressTensor, SurfaceCompensation, cauchy,
+    self, MeasuredStress, StressInput, StressMethod, StressTensor, SurfaceCompensation, cauchy,
     deformation_gradients,
 };
 use harness::observe::{Fields, Observer, Scalars};
@@ -16,7 +16,7 @@ use std::cell::{OnceCell, RefCell};
 use std::time::Instant;
 
 /// A stress field of each measure.
-pub type StressFields<const D: usize> = Vec<(StressMeasure, Vec<StressTensor<D>>)>;
+pub type StressFields<const D: usize> = Vec<(StressMethod, Vec<StressTensor<D>>)>;
 
 /// Stresses of a state by every measure that the scene names.
 #[derive(Default)]
@@ -113,8 +113,8 @@ impl<'a, const D: usize> Moment<'a, D> {
         let Some(material) = evaluator.bond_material() else {
             let found = phases.time("stress constitutive", || evaluator.stress(bonds, state));
             if let Some([piola, cauchy]) = found {
-                stresses.cauchy.push((StressMeasure::Constitutive, cauchy));
-                stresses.piola.extend(keeps.then_some((StressMeasure::Constitutive, piola)));
+                stresses.cauchy.push((StressMethod::Constitutive, cauchy));
+                stresses.piola.extend(keeps.then_some((StressMethod::Constitutive, piola)));
             }
             return Ok(stresses);
         };

@@ -5,7 +5,7 @@ use super::outcome::Outcome;
 use super::outcome::families;
 use crate::exact;
 use crate::program::scene::{ExactSpec, Scene};
-use crate::stress::StressMeasure;
+use crate::stress::StressMethod;
 use harness::output::csv;
 use harness::output::picture::{LegendPlace, LinePlot, Series};
 use polycore::Error;
@@ -30,7 +30,7 @@ pub fn curves(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), 
     cost = cost.axes("build + solve + stress (s)", error_axis);
     let mut rows: Vec<Vec<f64>> = vec![Vec::new(); 5];
     for (index, measure) in
-        stress.measures.iter().enumerate().filter(|(_, m)| **m != StressMeasure::AsPublished)
+        stress.measures.iter().enumerate().filter(|(_, m)| **m != StressMethod::AsPublished)
     {
         let name = measure.name();
         let mut convergence = LinePlot::new(&format!("Stress error of the plate with a hole, {name}"));

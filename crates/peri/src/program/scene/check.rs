@@ -5,7 +5,7 @@ use super::variant::{Variant, variants};
 use super::{HORIZON_RATIO, Method, Parameter, Probe, Scene, Track};
 use crate::calibrate::{Calibration, Space};
 use crate::solver::Policy;
-use crate::stress::StressMeasure;
+use crate::stress::StressMethod;
 use harness::scene::{SceneError, Source};
 
 /// Rows of history of a run in time.
@@ -243,11 +243,8 @@ fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         return Err(source.error("material.youngs_modulus", "nothing", allowed));
     };
     positive(source, "material.youngs_modulus", youngs_modulus.si(), "Pa")?;
-    if let Some(index) = scene
-        .stress
-        .iter()
-        .flat_map(|stress| &stress.measures)
-        .position(|&m| m == StressMeasure::Constitutive)
+    if let Some(index) =
+        scene.stress.iter().flat_map(|stress| &stress.measures).position(|&m| m == StressMethod::Constitutive)
     {
         let key = format!("stress.measures[{index}]");
         return Err(source.error(

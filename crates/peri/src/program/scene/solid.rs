@@ -7,7 +7,7 @@ use crate::bonds::VolumeCorrection;
 use crate::calibrate::{Calibration, Space};
 use crate::error::Error;
 use crate::material::{Correspondence, EightChainSolid, PointLaw};
-use crate::stress::StressMeasure;
+use crate::stress::StressMethod;
 use harness::scene::{ConstitutiveSpec, SceneError, Source};
 use polycore::constitutive::surrogate::Kind;
 use polycore::units::Stress;
@@ -208,7 +208,7 @@ pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<
         .stress
         .iter()
         .flat_map(|stress| &stress.measures)
-        .position(|&m| m != StressMeasure::Constitutive);
+        .position(|&m| m != StressMethod::Constitutive);
     if let Some(index) = other {
         let allowed = "`constitutive`, the stress of the law itself";
         return Err(source.error(&format!("stress.measures[{index}]"), "a measure of bond forces", allowed));
