@@ -1,4 +1,4 @@
-//! What force kernels are measured on; `cargo bench` takes it, too.
+//! Bodies and materials on which force kernels are measured, here and by `cargo bench`.
 
 use peri::Error;
 use peri::bonds::{Bonds, Lattice, LatticeBonds, VolumeCorrection};
@@ -15,14 +15,14 @@ use rayon::prelude::*;
 /// Horizon over spacing of every measurement.
 pub const RATIO: f64 = 3.015;
 
-/// A square or cube of about so many particles.
+/// A square or cube of about this number of particles.
 pub fn block<const D: usize>(particles: f64) -> Result<Lattice<D>, Error> {
     let side = particles.powf(1.0 / D as f64).round();
     let body = [Operation::Add(Shape::Box { min: [0.0; D], max: [side; D] })];
     lattice(&body, 1.0, 1.0)
 }
 
-/// Its bonds.
+/// Bonds of a lattice.
 pub fn bonds<const D: usize>(lattice: Lattice<D>) -> Result<LatticeBonds<D>, Error> {
     LatticeBonds::new(lattice, RATIO, VolumeCorrection::None, &[])
 }
@@ -45,7 +45,7 @@ pub fn loaded<const D: usize>(
     Ok((fit, displacement))
 }
 
-/// A material at work, and its name.
+/// A material ready for solvers, and its name.
 pub type Named<const D: usize> = (&'static str, Box<dyn SolverMaterial<D>>);
 
 /// Solids with two passes, by name: chains of 25 links, and by correspondence neo-Hookean rubber, K/μ = 100,

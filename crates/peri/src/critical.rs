@@ -196,8 +196,7 @@ impl Critical {
                 let softening = bilinear(bonds, energy, onset).map_err(|limit| {
                     fault(format!(
                         "less, or a finer spacing: at it W = {onset:.4e} J/m³, and bonds of this fracture \
-                        energy break at \
-                         {limit:.4e} J/m³"
+                         energy break at {limit:.4e} J/m³"
                     ))
                 })?;
                 Ok(Criterion::Softening(softening))

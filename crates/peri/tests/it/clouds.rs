@@ -35,7 +35,7 @@ impl Scattered {
         Self { side, spacing: 1.0, ratio: 3.015, jitter, uneven: 0.0, correction }
     }
 
-    /// The bonds, with θ where `relieved`.
+    /// Builds the bonds, with θ if `relieved`.
     fn build<const D: usize>(&self, relieved: bool) -> CloudBonds<D> {
         let mut random = Random(5);
         let count = self.side.pow(D as u32);
@@ -76,7 +76,7 @@ fn largest<const D: usize>(field: &Field<D>) -> f64 {
     field.components().iter().flat_map(|c| c.iter()).fold(0.0, |most, x| most.max(x.abs()))
 }
 
-/// Severs each bond that `choose` names by its ends, from both of them.
+/// Severs each bond that `choose` selects by its ends, from both of them.
 fn sever<const D: usize>(bonds: &mut CloudBonds<D>, mut choose: impl FnMut(usize, usize) -> bool) {
     let mut list = Vec::new();
     for site in 0..bonds.sites() {
@@ -312,7 +312,7 @@ fn forces_in_relieved_clouds_are_slopes() {
     slopes::<3>(Space::Solid, 8, 2.015);
 }
 
-/// What a bond releases is the slope of the energy by its integrity, to the digits of differences.
+/// The energy released by a bond is the slope of the energy by its integrity, to the digits of differences.
 #[test]
 fn bonds_of_relieved_clouds_release_the_slope_of_the_energy() {
     let mut bonds = Scattered { uneven: 0.2, ..Scattered::new(12, 0.2) }.build::<2>(true);

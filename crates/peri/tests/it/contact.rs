@@ -63,7 +63,7 @@ fn two_particles() {
         assert!((force[0][0] + push).abs() <= 1e-14 * stiffness && force[0][1] == 0.0);
         assert!((energy - 0.5 * push * overlap).abs() <= 1e-14 * stiffness, "r = {r}: {energy}");
     }
-    // past each other: pushed on, contact knows distances only
+    // past each other: pushed on, as contact depends on distances only
     let (force, _) = contact(&cloud, &sites, &[[0.0; 2], [-3.0, 0.0]]);
     assert!(force[1][0] < 0.0);
     // bonded: never
@@ -71,8 +71,8 @@ fn two_particles() {
     assert_eq!(contact(&near, &sites, &[[0.0; 2], [-1.0, 0.0]]), (vec![[0.0; 2]; 2], 0.0));
 }
 
-/// In one place (r = 0) the force is κcd/δ along the reference bond, at any distance from home; the other
-/// limits are 0.
+/// The force of particles at one point (r = 0) is κcd/δ along the reference bond, at any distance from home;
+/// the other limits are 0.
 #[test]
 fn degenerate_states() {
     let points = [[0.0, 0.0, 0.0], [1.2, 0.0, 1.6]];
@@ -144,7 +144,7 @@ fn lattice_and_cloud_equal_plain_sums() {
     check_plainly([4, 5, 24]);
 }
 
-/// Pairs whose bonds break are taken into a list that stays, and later moves within its skin need no other.
+/// Pairs whose bonds break join a list that stays valid; later moves within its skin need no other.
 fn check_parted<const D: usize>(cells: [usize; D]) {
     fn parted<const D: usize>(bonds: &mut dyn Bonds<D>, sites: &[usize], count: usize) {
         let mut random = Random(11);

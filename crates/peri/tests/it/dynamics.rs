@@ -12,7 +12,7 @@ use std::f64::consts::PI;
 
 pub const DENSITY: f64 = 2.3;
 
-/// Runs to the end without a look at what happens on the way.
+/// Runs to the end without callbacks.
 pub fn run<const D: usize>(
     solver: &VelocityVerlet,
     bonds: &mut dyn Bonds<D>,
@@ -192,7 +192,8 @@ fn energies_balance() {
         let error = |r: &StepRecord| r.kinetic + r.stored + r.released + r.damped - r.work;
         let worst = state.history.iter().map(|r| error(r).abs()).fold(0.0, f64::max) / scale;
         eprintln!(
-            "step {part} of critical, damping {damping}, {} broken: work {:.3e}, kinetic {:.3e}, stored {:.3e}, \
+            "step {part} of critical, damping {damping}, {} broken: work {:.3e}, kinetic {:.3e}, stored \
+            {:.3e}, \
              released {:.3e}, damped {:.3e} J; off by {worst:.1e}",
             last.broken, last.work, last.kinetic, last.stored, last.released, last.damped
         );
@@ -371,7 +372,8 @@ fn rigid_rotation() {
     let energy =
         state.history.iter().map(|r| ((r.kinetic + r.stored) / r.work - 1.0).abs()).fold(0.0, f64::max);
     eprintln!(
-        "one free turn in {} steps: momentum {moved:.1e}, spin {turned:.1e}, energy {energy:.1e}, stretch {:.5}",
+        "one free turn in {} steps: momentum {moved:.1e}, spin {turned:.1e}, energy {energy:.1e}, stretch \
+        {:.5}",
         state.counts.total_iterations,
         state.history.last().unwrap().largest_stretch
     );

@@ -60,7 +60,7 @@ fn solved(
     (result, state)
 }
 
-/// One bond of the linear law, f = 2·3kθ(λ − 1)V²: the steps below the force at the critical stretch are
+/// A single bond of the linear law, f = 2·3kθ(λ − 1)V²: the steps below the force at the critical stretch are
 /// rows, the next ends the run.
 #[test]
 fn a_bond_holds_up_to_its_strength() {
@@ -138,8 +138,8 @@ fn torn_by_a_force() {
     }
 }
 
-/// Nothing holds it: refused before any iteration, along the axis that is missing; held along it or balanced,
-/// it is solved.
+/// Refuses an unsupported body before any iteration, along the axis that is missing; held along it or
+/// balanced, it is solved.
 #[test]
 fn free_bodies_under_forces() {
     for (held, force, missing) in [
@@ -170,8 +170,8 @@ fn free_bodies_under_forces() {
     solved(&mut bonds, &loads, &[1.0], None, &Lbfgs::default()).0.unwrap();
 }
 
-/// Two blocks a gap apart: what bears a force is judged part by part, and contact may hold what presses on
-/// something.
+/// Two blocks a gap apart: forces are judged part by part, and contact may hold a part that presses on
+/// another.
 #[test]
 fn parts_and_stops() {
     let block = |low: f64| Operation::Add(Shape::Box { min: [0.0, low], max: [8.0, low + 6.0] });
@@ -197,9 +197,9 @@ fn parts_and_stops() {
     );
 }
 
-/// One side moved past the other, in one step or many, of all components or of one; a region turned inside
-/// out; and what looks like it and is not: half the height, a punch through a ring, a part turned by a right
-/// angle.
+/// Refuses a side moved past the other, in one step or many, in all components or one, and a region turned
+/// inside out; accepts similar but valid cases: half the height, a punch through a ring, a part turned by a
+/// right angle.
 #[test]
 fn bodies_crushed_through_themselves() {
     let cube = || Body::<3>::solid([6, 6, 10], 0.1, 3.015).build().lattice;

@@ -135,8 +135,8 @@ fn slides_down() {
     }
 }
 
-/// What sticks swings about its elastic slip mg sin θ/k_t by as much, and does not creep: as far after ten
-/// times the time.
+/// A sticking particle oscillates about its elastic slip mg sin θ/k_t by as much, and does not creep: as far
+/// after ten times the time.
 #[test]
 fn sticks_without_creep() {
     for (degrees, mu) in [(10.0_f64, 0.3), (20.0, 0.5), (20.0, 10.0)] {
@@ -146,7 +146,7 @@ fn sticks_without_creep() {
             let ([x, _], error, row) = incline.run();
             let slip = G * theta.sin() / PENALTY;
             eprintln!("sticks at {degrees}°, μ = {mu}: {x:e} m, slip {slip:e}, off by {error:.1e} J");
-            // at 10° the swing passes μN: 2 sin θ > μ cos θ, and what slides does so once
+            // at 10° the oscillation exceeds μN: 2 sin θ > μ cos θ, and the particle slides once
             let slides = (2.0 * theta.sin() - mu * theta.cos()).max(0.0) * G / PENALTY;
             assert!(x > -1e-9 && x < 2.0 * slip + slides && error.abs() < 1e-9, "{x:e}");
             assert!(row.rubbed < mu * G * 2.0 * slip);
@@ -167,8 +167,7 @@ fn stops_after() {
     }
 }
 
-/// On a belt a particle is dragged until it has the belt's velocity V; half of the belt's work mV² becomes
-/// heat.
+/// Drags a particle on a belt until it has the belt's velocity V; half of the belt's work mV² becomes heat.
 #[test]
 fn belt_drags() {
     let incline = Incline { theta: 0.0, mu: 0.4, v0: 0.0, time: 1.0, step: 1e-4, belt: 1.5 };
@@ -176,7 +175,7 @@ fn belt_drags() {
     let reached = 1.5 / (0.4 * G);
     let exact = 1.5 * (1.0 - reached) + 0.5 * 1.5 * reached;
     eprintln!("belt: {v:.6} m/s, {x:.6} m of {exact:.6}, heat {:.6} of 1.125 J, off {error:.1e}", row.rubbed);
-    // what sticks swings by its elastic slip at the frequency √(k/m) = 1e3/s
+    // a sticking particle oscillates by its elastic slip at the frequency √(k/m) = 1e3/s
     assert!((v - 1.5).abs() < 4e-3 && (x - exact).abs() < 1e-4 && error.abs() < 5e-6);
     assert!((row.rubbed - 1.125).abs() < 1e-4);
     let push = [-0.3_f64.sin(), 0.3_f64.cos()].map(|n| n * G);
@@ -186,8 +185,7 @@ fn belt_drags() {
     assert!(along.abs() <= 0.4 * G);
 }
 
-/// In equilibrium the drag of a belt grows as k_t U until it is μN, to rounding, whatever the number of
-/// steps.
+/// Equilibrium drag of a belt: it grows as k_t U until it is μN, to rounding, whatever the number of steps.
 #[test]
 fn belt_in_equilibrium() {
     for (method, steps) in [(0, 4), (1, 4), (1, 16), (1, 64)] {
@@ -558,7 +556,7 @@ fn dragged_over_a_plane() {
     }
 }
 
-/// What planes and friction are not.
+/// Invalid planes and friction parameters are refused.
 #[test]
 fn refuses() {
     let one = Body::<2>::solid([1, 1], 1.0, 3.015).build().lattice;

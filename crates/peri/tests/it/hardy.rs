@@ -1,7 +1,7 @@
 //! Measures whose weights sum to 1: the patch test up to free edges, bonds shared out whole, the balance of
 //! momentum, and the definitions written out here.
 
-use crate::bodies::{Body, Built, ContactPair, MODULUS, Random, fit, norm, scatter, stretch_range};
+use crate::bodies::{Body, BondPair, Built, MODULUS, Random, fit, norm, scatter, stretch_range};
 use peri::bonds::{BodyGeometry, BondDamage, BondForces, Overstretched};
 use peri::geometry::{Operation, Shape};
 use peri::potential::{BondPotential, KernelFit, Law};
@@ -49,8 +49,8 @@ fn strained<const D: usize>(points: &[[f64; D]]) -> Vec<[f64; D]> {
     points.iter().map(|x| std::array::from_fn(|a| (0..D).map(|b| h(a, b) * x[b]).sum())).collect()
 }
 
-/// In a body with a hole every particle, at edges, corners and the hole, has the stress that its own bonds
-/// give where none is missing; the greatest error by `hardy`.
+/// Checks that in a body with a hole every particle, at edges, corners and the hole, has the stress of its
+/// own bonds if none is missing; the greatest error by `hardy`.
 fn patch<const D: usize>(ratio: f64, cells: [usize; D], measures: &[StressMethod]) -> f64 {
     let mut body = Body::<D>::solid(cells, 1.0, ratio);
     let far = 2.0 * ratio;
@@ -83,7 +83,7 @@ fn patch<const D: usize>(ratio: f64, cells: [usize; D], measures: &[StressMethod
         }
         assert!(worst < 1e-13, "{D}D, m = {ratio}, {}: {worst:e}", measure.name());
     }
-    // what the old weights miss by: the check can fail
+    // errors of the old weights: the check can fail
     let old = on_lattice(&built, &fit, &u, StressMethod::BallShare, SurfaceCompensation::Bonds)[inside];
     assert!(apart(&old, &exact) > 1e-3 * size(&exact));
     of_hardy
@@ -208,7 +208,7 @@ fn clouds_share_bonds_out() {
 }
 
 /// Bodies, forces of their bonds, and their displacement, smooth and not uniform.
-fn smooth() -> (Body<2>, Built<2>, Vec<ContactPair<2>>, Vec<[f64; 2]>) {
+fn smooth() -> (Body<2>, Built<2>, Vec<BondPair<2>>, Vec<[f64; 2]>) {
     let body = Body::<2>::solid([29, 29], 1.0, 3.015);
     let built = body.build();
     let u = built
@@ -225,7 +225,7 @@ fn smooth() -> (Body<2>, Built<2>, Vec<ContactPair<2>>, Vec<[f64; 2]>) {
 
 /// Σ f ⊗ ξ ∫₀¹ φ(X_I + αξ − X) dα over all pairs, the integral by `steps` midpoints: Eqs (2.14), (2.15).
 fn by_definition(
-    pairs: &[ContactPair<2>],
+    pairs: &[BondPair<2>],
     points: &[[f64; 2]],
     law: &dyn BondPotential,
     u: &[[f64; 2]],

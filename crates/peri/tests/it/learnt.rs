@@ -1,5 +1,5 @@
-//! Laws learnt from data as solids: the battery of all materials, homogeneous deformations, flags, and what
-//! is refused.
+//! Laws learnt from data as solids: the battery of all materials, homogeneous deformations, flags, and
+//! refusals.
 
 use crate::bodies::{Body, scatter};
 use crate::materials::battery;

@@ -68,7 +68,7 @@ fn a_model_is_its_parts() {
     assert!(stress.len() == particles && stress.iter().flatten().flatten().all(|x| x.is_finite()));
 }
 
-/// One method goes on where another one ended: further load steps, then motion.
+/// Methods continue from one another: further load steps, then motion.
 #[test]
 fn a_simulation_goes_on() {
     let model = Model::new(sheet(), Rubber::new(Law::Linear, 1e6));

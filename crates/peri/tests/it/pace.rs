@@ -28,7 +28,7 @@ fn block<const D: usize>(cells: [usize; D]) -> LatticeBonds<D> {
     LatticeBonds::new(lattice(&body, 1.0, 1.0).unwrap(), 3.015, VolumeCorrection::None, &[]).unwrap()
 }
 
-/// A part of the bonds, each from both ends.
+/// Selects a fraction of the bonds, each from both ends.
 fn some<const D: usize>(bonds: &dyn Bonds<D>, part: f64, random: &mut Random) -> Vec<Overstretched> {
     let mut ends = Vec::new();
     for &site in bonds.particles() {
@@ -92,8 +92,8 @@ fn tightness<const D: usize, M: Material<D> + 'static>(
     found
 }
 
-/// What steps are made for is 1.3 ω² at least (the margin), and not much more: 16 times only in plane stress
-/// of finite K, where the law's own bound does not follow the thickness, and 40 times for the network, whose
+/// Steps are made for at least 1.3 ω² (the margin), and not much more: 16 times only in plane stress of
+/// finite K, where the law's own bound does not follow the thickness, and 40 times for the network, whose
 /// bound is that of Gershgorin with the stiffest neighbour.
 #[test]
 fn frequencies_are_bounded_at_any_stretch_and_damage() {
@@ -149,7 +149,8 @@ fn pulled<const D: usize, M: Material<D> + 'static>(name: &str, cells: [usize; D
     let worst = state.history.iter().map(off).fold(0.0, f64::max);
     let most = state.history.iter().map(|row| row.largest_stretch).fold(0.0, f64::max);
     println!(
-        "{name}: {} steps, {} forces, {} bounds, {} searches, stretch {most:.2}, energies off by {worst:.1e}, step {:.4} of {:.4} at rest",
+        "{name}: {} steps, {} forces, {} bounds, {} searches, stretch {most:.2}, energies off by \
+        {worst:.1e}, step {:.4} of {:.4} at rest",
         state.counts.total_iterations,
         state.counts.evaluations,
         state.motion.limits.bounds,
@@ -221,7 +222,8 @@ fn torn_solids_keep_a_stable_step() {
     let last = one.history.last().unwrap();
     let off = (last.work - last.stored - last.kinetic - last.damped - last.released).abs() / last.work;
     println!(
-        "torn: {} steps, {} forces, {} bounds, {} searches, {} broken, energies off by {off:.1e} of {:.3}, step {:.2e} of {:.2e} at rest",
+        "torn: {} steps, {} forces, {} bounds, {} searches, {} broken, energies off by {off:.1e} of {:.3}, \
+        step {:.2e} of {:.2e} at rest",
         one.counts.total_iterations,
         one.counts.evaluations,
         one.motion.limits.bounds,

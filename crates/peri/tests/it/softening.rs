@@ -69,8 +69,8 @@ fn forces<const D: usize>(
 /// A way to compute forces: its name, bonds, material and displacement.
 type Path<'a, const D: usize> = (&'a str, &'a dyn Bonds<D>, Box<dyn SolverMaterial<D>>, Field<D>);
 
-/// At constant integrities forces are slopes of the energy and sum to zero, on lattices by kernels and by
-/// plain loops, and in clouds.
+/// Checks at constant integrities that forces are slopes of the energy and sum to zero, on lattices by
+/// kernels and by plain loops, and in clouds.
 fn slopes<const D: usize>(space: Space, cells: [usize; D]) {
     let body = Body::damaged(cells, 1.0, 3.015);
     let mut built = body.build();
@@ -255,7 +255,8 @@ fn a_softening_strip_tears() {
         let last = whole.history.last().unwrap();
         let soft: u64 = saved.iter().map(|state| state.fracture.softened.len() as u64).max().unwrap();
         eprintln!(
-            "moving {moving}: {} broken, up to {soft} softened, {} evaluations, {} states; work {:.4}, stored {:.4}, released {:.4}, kinetic {:.4}",
+            "moving {moving}: {} broken, up to {soft} softened, {} evaluations, {} states; work {:.4}, \
+            stored {:.4}, released {:.4}, kinetic {:.4}",
             last.broken,
             whole.counts.evaluations,
             saved.len(),
@@ -280,9 +281,9 @@ fn a_softening_strip_tears() {
     }
 }
 
-/// In a uniform state every bond of every particle releases Y = W: under several stresses the strength of
-/// softening bonds is the surface W = Y₀. Small strains at ν = 0.4995: an equibiaxial strength of σ_ts/√(2(1
-/// − ν)), and a hydrostatic one of σ_ts/√(3(1 − 2ν)) = 18.3 σ_ts.
+/// Checks that in a uniform state every bond of every particle releases Y = W: under several stresses the
+/// strength of softening bonds is the surface W = Y₀. Small strains at ν = 0.4995: an equibiaxial strength of
+/// σ_ts/√(2(1 − ν)), and a hydrostatic one of σ_ts/√(3(1 − 2ν)) = 18.3 σ_ts.
 #[test]
 fn the_strength_surface_is_one_of_equal_energy() {
     let poisson = 0.4995_f64;

@@ -1,7 +1,7 @@
 //! Stress measures against independent tables (`stress_patch.csv`, `stress_surface.csv`, made by
 //! `s3_stress.py`), against the sum over all bonds written out here, and against the balance of momentum.
 
-use crate::bodies::{Body, Built, ContactPair, MODULUS, Random, fit, norm, scatter, stretch_range};
+use crate::bodies::{Body, BondPair, Built, MODULUS, Random, fit, norm, scatter, stretch_range};
 use peri::bonds::{BodyGeometry, BondForces, LatticeBonds};
 use peri::calibrate::{Space, modulus, poisson_ratio};
 use peri::field::Field;
@@ -268,7 +268,7 @@ fn ball_inside_thin_bodies() {
 fn hardy_sum<const D: usize>(
     body: &Body<D>,
     points: &[[f64; D]],
-    pairs: &[ContactPair<D>],
+    pairs: &[BondPair<D>],
     law: &dyn BondPotential,
     u: &[[f64; D]],
     at: [f64; D],

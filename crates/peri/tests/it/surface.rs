@@ -69,7 +69,8 @@ fn plate(spacing: f64, volume: VolumeCorrection, surface: bool) -> [f64; 3] {
     let hardy = largest(piola_on_lattice(&bonds, &loaded, StressMethod::BallShare, BallVolume::Particles));
     let one_point = largest(piola_on_lattice(&bonds, &loaded, StressMethod::OnePoint, BallVolume::Particles));
     eprintln!(
-        "dx = {spacing}, {volume:?}, surface {surface}: strain {:.4}, hardy {hardy:.3}, one-point {one_point:.3}, {} its",
+        "dx = {spacing}, {volume:?}, surface {surface}: strain {:.4}, hardy {hardy:.3}, one-point \
+        {one_point:.3}, {} its",
         strain / stress,
         state.counts.total_iterations
     );

@@ -101,8 +101,9 @@ fn context<'a>(law: &'a dyn BondPotential, bonds: &LatticeBonds<2>, youngs: f64)
     }
 }
 
-/// Of a linear law λ_c − 1 goes with √G: by `bonds` it is that of Silling and Askari (√(4πG/(9Eδ)) in plane
-/// stress), by `tearing` √c times smaller; by `softening` the energy is e_f times that up to the onset.
+/// Critical stretches of a linear law: λ_c − 1 is proportional to √G: by `bonds` it is that of Silling and
+/// Askari (√(4πG/(9Eδ)) in plane stress), by `tearing` √c times smaller; by `softening` the energy is e_f
+/// times that up to the onset.
 #[test]
 fn critical_stretches_of_the_conventions() {
     let law = Law::Linear.build(0.0, 0.0, false).unwrap();
@@ -123,7 +124,7 @@ fn critical_stretches_of_the_conventions() {
     near("softening_energy", fracture_energy(&context, Convention::Softening, end) / 80.0, 1.0, 1e-9);
 }
 
-/// By `bonds` the critical stretch has the bits that it had before there were conventions
+/// Compares the critical stretch by `bonds` with its bits before there were conventions
 /// (pure-shear-bond-law.toml of the inputs, run by that build).
 #[test]
 fn bonds_are_what_they_were() {
@@ -282,7 +283,7 @@ fn areas_of_cracks() {
     near("crack_area_solid", area.area::<3>(&solid), exact, 1e-12);
 }
 
-/// What `peri check` says of a scene.
+/// Output of `peri check` for a scene.
 fn told(text: &str, folder: &Path) -> String {
     let source = Source::new(folder.join("scene.toml"), text);
     let scene = source.parse::<Scene>().unwrap_or_else(|error| panic!("{}", error.render()));
@@ -330,8 +331,16 @@ fn causes_of_other_energies_are_named() {
     let slab = STRIP
         .replace("plane-stress", "solid")
         .replace("thickness = \"1 mm\"\n", "")
-        .replace("\"-12 mm\"], max = [\"80 mm\", \"12 mm\"]", "\"-12 mm\", \"0 mm\"], max = [\"80 mm\", \"12 mm\", \"6 mm\"]")
-        .replace("from = [\"-1 mm\", \"0 mm\"], to = [\"40 mm\", \"0 mm\"]", "from = [\"-1 mm\", \"0 mm\", \"-1 mm\"], to = [\"40 mm\", \"0 mm\", \"-1 mm\"], and = [\"-1 mm\", \"0 mm\", \"7 mm\"]")
+        .replace(
+            "\"-12 mm\"], max = [\"80 mm\", \"12 mm\"]",
+            "\"-12 mm\", \"0 mm\"], max = [\"80 mm\", \
+        \"12 mm\", \"6 mm\"]",
+        )
+        .replace(
+            "from = [\"-1 mm\", \"0 mm\"], to = [\"40 mm\", \"0 mm\"]",
+            "from = [\"-1 mm\", \"0 mm\", \
+        \"-1 mm\"], to = [\"40 mm\", \"0 mm\", \"-1 mm\"], and = [\"-1 mm\", \"0 mm\", \"7 mm\"]",
+        )
         .replace("[\"0 mm\", \"0 mm\"]", "[\"0 mm\", \"0 mm\", \"free\"]")
         .replace("[\"0 mm\", \"0.4 mm\"]", "[\"0 mm\", \"0.4 mm\", \"free\"]");
     for (scene, cause) in [
