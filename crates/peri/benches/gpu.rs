@@ -40,7 +40,8 @@ fn measure<const D: usize>(cells: u32, steps: u64) -> Result<(), Box<dyn std::er
     let (seconds, threads) = (begin.elapsed().as_secs_f64(), std::thread::available_parallelism()?);
     let rate = (count * evaluations) as f64 / seconds;
     println!(
-        "  host, {threads} threads, Double: {count} bonds, {evaluations} forces, {seconds:.3} s, {rate:.3e} directed bonds/s"
+        "  host, {threads} threads, Double: {count} bonds, {evaluations} forces, {seconds:.3} s, {rate:.3e} \
+        directed bonds/s"
     );
 
     let largest = |field: &Field<D>| {
@@ -75,7 +76,8 @@ fn measure<const D: usize>(cells: u32, steps: u64) -> Result<(), Box<dyn std::er
         let (name, rate) = (device.name(), (count * steps) as f64 / seconds);
         let [error, moved] = [apart / largest(&expected), largest(&motion.displacement) / SPACING];
         println!(
-            "  {name}, {precision:?}: {count} bonds, {steps} steps, {seconds:.3} s, {rate:.3e} directed bonds/s, forces off by \
+            "  {name}, {precision:?}: {count} bonds, {steps} steps, {seconds:.3} s, {rate:.3e} directed \
+            bonds/s, forces off by \
              {error:.1e} of the largest; displacements up to {moved:.3} spacings"
         );
     }

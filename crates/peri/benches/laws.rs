@@ -20,7 +20,7 @@ const NODES: [usize; 4] = [50, 200, 1000, 4000];
 /// Bounds of fits, the second that of the solvers.
 const BOUNDS: [f64; 4] = [1e-4, 1e-6, 1e-9, 1e-11];
 
-/// Every way with every setting.
+/// Measures every method with every setting.
 pub fn measure() -> Result<Vec<Measurement>, Error> {
     let law = Law::ChainOffset.build(720.0, 1200.0, false)?;
     let strains: Vec<f64> = stretches().iter().map(|l| l * l - 1.0).collect();
@@ -119,14 +119,14 @@ impl Table {
         Self { per_width: 1.0 / width, nodes }
     }
 
-    /// The nodes on both sides, and how far from the first to the second.
+    /// Nodes on both sides, and the position between them.
     fn between(&self, stretch: f64) -> ([f64; 2], [f64; 2], f64) {
         let place = (stretch - RANGE[0]) * self.per_width;
         let k = (place as usize).min(self.nodes.len() - 2);
         (self.nodes[k], self.nodes[k + 1], place - k as f64)
     }
 
-    /// As the thesis has it (§2.4).
+    /// Linear interpolation, as in the thesis (§2.4).
     fn linear(&self, strains: &[f64], found: &mut [f64]) {
         for (e, q) in strains.iter().zip(found) {
             let l = (1.0 + e).sqrt();

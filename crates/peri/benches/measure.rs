@@ -25,7 +25,7 @@ const REPEATS: usize = 7;
 
 type Failure = Box<dyn std::error::Error>;
 
-/// What to measure.
+/// Options of the measurement.
 #[derive(Parser)]
 struct Bench {
     /// Print JSON rows {what, size, threads, value, unit}.
@@ -46,7 +46,7 @@ struct Bench {
     laws: bool,
     #[command(flatten)]
     threads: Threads,
-    /// What `cargo bench` adds.
+    /// Flag added by `cargo bench`.
     #[arg(long, hide = true)]
     bench: bool,
 }
@@ -138,7 +138,7 @@ fn measure_dimension<const D: usize>(
         measure_bonds(&mut cloud, "list", Law::ChainOffset, [0.95, 1.05], threads, rows)?;
         let seconds = measure_bonds(&mut cloud, "list", Law::ChainOffset, WIDE, threads, rows)?;
         measure_solids(&mut cloud, "list", seconds, threads, rows)?;
-        // that of scenes, which takes as long where it is zero
+        // stretches of scenes; softening takes as long if it is zero
         let start = Instant::now();
         let theta = relief(&cloud).unwrap_or_else(|| Field::zeros(cloud.sites()));
         cloud.set_relief(theta);
@@ -150,7 +150,7 @@ fn measure_dimension<const D: usize>(
     Ok(())
 }
 
-/// Both passes of solids with any Poisson ratio, and their time over that of a bond law.
+/// Measures the two passes of solids with any Poisson ratio, and their time over that of a bond law.
 fn measure_solids<const D: usize>(
     bonds: &mut dyn Bonds<D>,
     path: &str,

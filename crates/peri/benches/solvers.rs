@@ -24,11 +24,11 @@ const THICKNESS: f64 = 10e-3;
 const RADIUS: f64 = 60e-3;
 /// Residuals requested.
 const TOLERANCES: [f64; 5] = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
-/// Residual of what errors are measured against.
+/// Residual of the reference solution.
 const REFERENCE: f64 = 1e-11;
 const METHODS: [&str; 2] = ["adr", "lbfgs"];
 
-/// What to compare on.
+/// Options of the comparison.
 #[derive(clap::Args)]
 #[command(next_help_heading = "Quasi-static methods")]
 pub struct Options {

@@ -22,7 +22,7 @@ pub struct LinearSolid {
     pub shear: Property,
 }
 
-/// What a particle knows of its family. W = ½α Σ e² V_J + ½b θ², since the mixed terms are sums over e.
+/// State of a particle's family. W = ½α Σ e² V_J + ½b θ², since the mixed terms are sums over e.
 #[derive(Clone, Default)]
 pub struct Point {
     alpha: f64,
@@ -38,15 +38,15 @@ pub struct Point {
 impl<const D: usize> Material<D> for LinearSolid {
     type Point = Point;
 
-    /// The whole family gives m.
+    /// Computes m from the whole family.
     fn begin(&self, family: &Family<D>) -> Point {
         let dimension = D as f64;
         let weighted = family.sum(|bond| bond.length * bond.length * bond.volume).max(f64::MIN_POSITIVE);
-        let alpha = dimension * (dimension + 2.0) * self.shear.at(family.site()) / weighted;
+        let alpha = dimension * (dimension + 2.0) * self.shear.value_at(family.site()) / weighted;
         Point { alpha, share: dimension / weighted, ..Point::default() }
     }
 
-    /// The intact bonds give θ and b.
+    /// Computes θ and b from the intact bonds.
     fn prepare(&self, family: &Family<D>, point: &mut Point) {
         let (mut weighted, mut extension, mut spread) = (0.0, 0.0, 0.0);
         family.each(|bond| {
@@ -56,12 +56,12 @@ impl<const D: usize> Material<D> for LinearSolid {
         });
         let dimension = D as f64;
         let both = 2.0 * dimension / point.share - weighted;
-        point.balance = self.bulk.at(family.site()) - point.alpha * both / (dimension * dimension);
+        point.balance = self.bulk.value_at(family.site()) - point.alpha * both / (dimension * dimension);
         point.dilatation = point.share * extension;
         point.spread = point.share * spread;
     }
 
-    /// Both ends pull along the bond: τ = (αe + bθ D|ξ|/m) ζ/|ζ|.
+    /// Force along the bond, from both ends: τ = (αe + bθ D|ξ|/m) ζ/|ζ|.
     fn force(&self, bond: &Bond<D>, own: &Point, other: &Point) -> [f64; D] {
         let pull = |end: &Point| {
             bond.length * (end.alpha * bond.strain() + end.balance * end.dilatation * end.share)
@@ -75,7 +75,7 @@ impl<const D: usize> Material<D> for LinearSolid {
         0.5 * point.alpha * squares + 0.5 * point.balance * point.dilatation.powi(2)
     }
 
-    /// Springs αe and the bond's turn, both ends; then b(∂θ/∂u)² and bθ ∂²θ/∂u², where both are positive.
+    /// Springs αe and the bond's rotation, both ends; then b(∂θ/∂u)² and bθ ∂²θ/∂u², where both are positive.
     fn stiffness(&self, family: &Family<D>, points: &[Point]) -> f64 {
         let own = &points[family.site()];
         let dilatation = own.balance.max(0.0) * own.spread * own.spread;
@@ -90,7 +90,7 @@ impl<const D: usize> Material<D> for LinearSolid {
             })
     }
 
-    /// Of Young's modulus E ≈ 3μ.
+    /// Micromodulus for Young's modulus E ≈ 3μ.
     fn micromodulus(&self, bonds: &dyn BodyGeometry<D>) -> f64 {
         modulus_in(bonds, 3.0 * self.shear.least())
     }

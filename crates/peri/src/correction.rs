@@ -49,7 +49,7 @@ pub fn bond_factors<const D: usize>(
     let mut factors = Field::zeros(bonds.sites());
     for site in bonds.particles().iter().map(|&site| site as usize) {
         let surface = surface.as_ref().map_or([1.0; D], |surface| surface.get(site));
-        factors.set(site, surface.map(|g| g * micromodulus.at(site)));
+        factors.set(site, surface.map(|g| g * micromodulus.value_at(site)));
     }
     Some(factors)
 }

@@ -164,7 +164,7 @@ pub const ONE_OF: &str = "exactly one of `percent_over_contour`, `stretch`, `fra
 
 impl Critical {
     /// Names of the alternatives given.
-    pub fn given(&self) -> Vec<&'static str> {
+    pub fn alternatives(&self) -> Vec<&'static str> {
         let all = [
             ("percent_over_contour", self.percent_over_contour.is_some()),
             ("stretch", self.stretch.is_some()),
@@ -179,7 +179,7 @@ impl Critical {
     /// # Errors
     /// [`Error::Parameter`] for a strength that the law does not reach or that is too large for the fracture
     /// energy.
-    pub fn of_solid<const D: usize>(
+    pub fn solid_criterion<const D: usize>(
         &self,
         law: &dyn PointLaw<D>,
         bonds: &dyn BodyGeometry<D>,
@@ -196,8 +196,7 @@ impl Critical {
                 let softening = bilinear(bonds, energy, onset).map_err(|limit| {
                     fault(format!(
                         "less, or a finer spacing: at it W = {onset:.4e} J/m³, and bonds of this fracture \
-                        energy break at \
-                         {limit:.4e} J/m³"
+                         energy break at {limit:.4e} J/m³"
                     ))
                 })?;
                 Ok(Criterion::Softening(softening))
@@ -217,7 +216,7 @@ impl Critical {
             return fault(
                 "critical.strength",
                 strength.si(),
-                "nothing: bond laws have none, `[material.solid]` has",
+                "only with `[material.solid]`: bond laws have no strength",
             );
         }
         match (self.percent_over_contour, self.stretch, self.fracture_energy) {
@@ -247,7 +246,7 @@ impl Critical {
             (None, None, Some(energy)) => {
                 stretch_of_energy(context, self.convention.unwrap_or(context.convention), energy.si())
             }
-            _ => fault("critical (number of alternatives)", self.given().len() as f64, ONE_OF),
+            _ => fault("critical (number of alternatives)", self.alternatives().len() as f64, ONE_OF),
         }
     }
 }

@@ -2,6 +2,7 @@
 
 /// Errors of the peridynamics crate.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// The body cannot be built.
     #[error("{0}")]
@@ -53,10 +54,10 @@ pub enum Error {
     #[error(
         "no equilibrium {}: {why}; {}",
         if *torn {
-                        format!("after {step} steps, torn at load factor {factor:.4}")
-                    } else {
-                        format!("at load factor {factor:.4}")
-                    },
+            format!("after {step} steps, torn at load factor {factor:.4}")
+        } else {
+            format!("at load factor {factor:.4}")
+        },
         if *torn {
             "the last equilibrium is kept; prescribe a displacement instead of the force to follow \
             the body beyond its peak load"

@@ -3,7 +3,7 @@
 mod hole;
 mod plate;
 
-pub use hole::{HoleComparison, Region};
+pub use hole::{HoleComparison, HoleRegion};
 pub use plate::Plate;
 
 use crate::bonds::Stencil;

@@ -8,15 +8,15 @@ pub use body::Body;
 pub use rubber::Rubber;
 
 use crate::bonds::{BodyGeometry, LatticeBonds, Property, covered_stretches, fragments};
-use crate::contact::{Contact, Plane};
+use crate::contact::{Contact, RigidPlane};
 use crate::error::Error;
 use crate::material::{BondMaterial, Material, NonlocalSolid, PointLaw};
 use crate::potential::KernelFit;
 use crate::probe::StressEvaluator;
 use crate::solver::{
-    Breaking, Loads, Method, Policy, Record, Rotation, State, Status, Support, System, Turned,
+    Breaking, Loads, Method, Policy, RotatingRegion, Rotation, State, Status, StepRecord, Support, System,
 };
-use crate::stress::{self, BallVolume, Loaded, Measure, Missing, Tensor};
+use crate::stress::{self, BallVolume, StressInput, StressMethod, StressTensor, SurfaceCompensation};
 use std::sync::Arc;
 
 /// A material of a body: a [`Material`], or a description that becomes one in a body, such as [`Rubber`].
@@ -44,7 +44,7 @@ impl<const D: usize, M: Material<D> + Clone> IntoMaterial<D> for M {
 }
 
 /// Selects the points X, m, that belong to a region.
-type Region<const D: usize> = Box<dyn Fn(&[[f64; D]]) -> Result<Vec<bool>, Error>>;
+type RegionTest<const D: usize> = Box<dyn Fn(&[[f64; D]]) -> Result<Vec<bool>, Error>>;
 
 /// A body, its material and its loads, before anything is built.
 ///
@@ -53,13 +53,13 @@ type Region<const D: usize> = Box<dyn Fn(&[[f64; D]]) -> Result<Vec<bool>, Error
 pub struct Model<const D: usize, M> {
     body: Body<D>,
     material: M,
-    regions: Vec<(Region<D>, Support<D>)>,
+    regions: Vec<(RegionTest<D>, Support<D>)>,
     /// Rotating regions, by their numbers.
     rotations: Vec<(usize, Rotation<D>)>,
     factors: Vec<f64>,
     critical_stretch: Option<Property>,
     contact: Option<f64>,
-    planes: Vec<Plane<D>>,
+    planes: Vec<RigidPlane<D>>,
 }
 
 impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
@@ -128,8 +128,8 @@ impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
     }
 
     /// Adds a rigid plane that the body cannot pass, or to which it is tied. Explicit dynamics takes larger
-    /// steps with a [`Plane::stiffness`] of 2.
-    pub fn plane(mut self, plane: Plane<D>) -> Self {
+    /// steps with a [`RigidPlane::stiffness`] of 2.
+    pub fn plane(mut self, plane: RigidPlane<D>) -> Self {
         self.planes.push(plane);
         self
     }
@@ -169,7 +169,7 @@ impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
         for (number, rotation) in self.rotations {
             let region = regions[..number].iter().filter(|(_, support)| holds(support)).count();
             let (shift, components, sites) = ([0.0; D], (1 << D) - 1, regions[number].0.clone());
-            loads.turn(&bonds, Turned { rotation, shift, components, region, sites });
+            loads.turn(&bonds, RotatingRegion { rotation, shift, components, region, sites });
         }
         let modulus = material.longitudinal_modulus(&bonds);
         let contact = match (self.contact, self.planes.is_empty()) {
@@ -248,7 +248,7 @@ impl<const D: usize, M: Material<D> + Clone> Simulation<D, M> {
     }
 
     /// Finished load steps, or the rows of a dynamic history.
-    pub fn history(&self) -> &[Record] {
+    pub fn history(&self) -> &[StepRecord] {
         &self.state.history
     }
 
@@ -267,7 +267,7 @@ impl<const D: usize, M: Material<D> + Clone> Simulation<D, M> {
 impl<const D: usize> Simulation<D, BondMaterial<'static>> {
     /// Creates an evaluator of bond forces, see [`crate::probe`].
     pub fn evaluator(&self) -> StressEvaluator<D> {
-        StressEvaluator::of_bonds(self.material.clone(), 1e-9, self.breaking.is_some())
+        StressEvaluator::for_bonds(self.material.clone(), 1e-9, self.breaking.is_some())
     }
 }
 
@@ -275,7 +275,7 @@ impl<const D: usize, L: PointLaw<D> + Clone + 'static> Simulation<D, NonlocalSol
     /// Creates an evaluator of forces, stresses and energy-momentum, see [`crate::probe`]; create it before
     /// bonds break.
     pub fn evaluator(&self) -> StressEvaluator<D> {
-        StressEvaluator::of_solid(Arc::new(self.material.0.clone()), false, &self.bonds)
+        StressEvaluator::for_solid(Arc::new(self.material.0.clone()), false, &self.bonds)
     }
 }
 
@@ -284,11 +284,11 @@ impl<const D: usize> Simulation<D, BondMaterial<'_>> {
     ///
     /// # Errors
     /// As [`KernelFit::new`].
-    pub fn piola(&self, measure: Measure) -> Result<Vec<Tensor<D>>, Error> {
+    pub fn piola(&self, measure: StressMethod) -> Result<Vec<StressTensor<D>>, Error> {
         let displacement = &self.state.displacement;
         let fit = KernelFit::new(self.material.law(), covered_stretches(&self.bonds, displacement), 1e-9)?;
-        let (modulus, missing) = (self.material.modulus(), Missing::WindowAt(&self.loaded));
-        let loaded = Loaded { displacement, fit: &fit, modulus, missing };
+        let (modulus, missing) = (self.material.modulus(), SurfaceCompensation::WindowAt(&self.loaded));
+        let loaded = StressInput { displacement, fit: &fit, modulus, missing };
         Ok(stress::piola(&self.bonds, &loaded, measure, BallVolume::default()))
     }
 
@@ -296,7 +296,7 @@ impl<const D: usize> Simulation<D, BondMaterial<'_>> {
     ///
     /// # Errors
     /// As [`Self::piola`].
-    pub fn cauchy(&self, measure: Measure) -> Result<Vec<Tensor<D>>, Error> {
+    pub fn cauchy(&self, measure: StressMethod) -> Result<Vec<StressTensor<D>>, Error> {
         let gradients = stress::deformation_gradients(&self.bonds, &self.state.displacement);
         Ok(stress::cauchy(&self.piola(measure)?, &gradients))
     }

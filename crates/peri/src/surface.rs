@@ -10,7 +10,7 @@ const SIDE: f64 = 0.01;
 
 /// A point of the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Face<const D: usize> {
+pub struct SurfaceFace<const D: usize> {
     /// Reference position, m.
     pub place: [f64; D],
     /// Outward unit normal.
@@ -37,7 +37,7 @@ impl<const D: usize> Patch<D> {
 
     /// Distance along the surface between a face and the point of the surface above a particle, and depth of
     /// the particle, m.
-    fn reach(&self, face: &Face<D>, point: [f64; D]) -> (f64, f64) {
+    fn reach(&self, face: &SurfaceFace<D>, point: [f64; D]) -> (f64, f64) {
         match *self {
             Self::Flat { axis, outward } => {
                 let aside: f64 =
@@ -62,14 +62,14 @@ impl<const D: usize> Patch<D> {
 
 /// Face points and their patches.
 #[derive(Clone, Debug, Default)]
-pub struct Surface<const D: usize> {
-    faces: Vec<Face<D>>,
+pub struct BodySurface<const D: usize> {
+    faces: Vec<SurfaceFace<D>>,
     patches: Vec<Patch<D>>,
     /// Number of faces, at the end of the list, that only bound the region below the others.
     bounds: usize,
 }
 
-impl<const D: usize> Surface<D> {
+impl<const D: usize> BodySurface<D> {
     /// Samples the boundary of shapes: flat sides above the columns of the lattice, round ones at equal arcs
     /// of about `spacing`, m.
     pub fn of_shapes(operations: &[Operation<D>], spacing: f64) -> Self {
@@ -77,7 +77,7 @@ impl<const D: usize> Surface<D> {
         let Some((low, high)) = bounds(operations) else { return surface };
         let counts = cell_counts(low, high, spacing);
         let origin = std::array::from_fn(|d| 0.5 * (low[d] + high[d]) - 0.5 * spacing * (counts[d] - 1.0));
-        let columns = Columns { origin, counts: counts.map(|count| count as usize), spacing };
+        let columns = CellColumns { origin, counts: counts.map(|count| count as usize), spacing };
         for operation in operations {
             let (shape, outward) = match operation {
                 Operation::Add(shape) => (shape, 1.0),
@@ -85,13 +85,13 @@ impl<const D: usize> Surface<D> {
             };
             surface.sample(shape, outward, &columns);
         }
-        let side = |face: &Face<D>, sign: f64| {
+        let side = |face: &SurfaceFace<D>, sign: f64| {
             let place = std::array::from_fn(|d| face.place[d] + sign * SIDE * spacing * face.normal[d]);
             inside(operations, place)
         };
         // sides of two shapes may lie in one plane
         let mut known = HashSet::new();
-        let mut is_new = |face: &Face<D>| known.insert((face.patch, face.place.map(f64::to_bits)));
+        let mut is_new = |face: &SurfaceFace<D>| known.insert((face.patch, face.place.map(f64::to_bits)));
         surface.faces.retain(|face| side(face, -1.0) && !side(face, 1.0) && is_new(face));
         surface
     }
@@ -113,7 +113,7 @@ impl<const D: usize> Surface<D> {
                 let mut place = lattice.position(site as usize);
                 place[axis] += 0.5 * outward * lattice.spacing();
                 let normal = std::array::from_fn(|d| if d == axis { outward } else { 0.0 });
-                faces.push(Face { place, normal, patch: patch as u32 });
+                faces.push(SurfaceFace { place, normal, patch: patch as u32 });
             }
         }
         Self { faces, patches, bounds: 0 }
@@ -121,7 +121,7 @@ impl<const D: usize> Surface<D> {
 
     /// Collects flat sides whose patches are those of [`Self::of_lattice`]: 2d and 2d + 1 for the normals
     /// along −d and d.
-    pub(crate) fn of_sides(faces: Vec<Face<D>>) -> Self {
+    pub(crate) fn of_sides(faces: Vec<SurfaceFace<D>>) -> Self {
         Self { faces, patches: Self::axes(), bounds: 0 }
     }
 
@@ -130,7 +130,8 @@ impl<const D: usize> Surface<D> {
         let shift = self.patches.len() as u32;
         self.patches.extend(&other.patches);
         let own = other.faces.len() - other.bounds;
-        self.faces.extend(other.faces[..own].iter().map(|face| Face { patch: face.patch + shift, ..*face }));
+        self.faces
+            .extend(other.faces[..own].iter().map(|face| SurfaceFace { patch: face.patch + shift, ..*face }));
         self.bounds += own;
         self
     }
@@ -145,13 +146,13 @@ impl<const D: usize> Surface<D> {
     }
 
     /// The face points.
-    pub fn faces(&self) -> &[Face<D>] {
+    pub fn faces(&self) -> &[SurfaceFace<D>] {
         &self.faces
     }
 
     /// Distance along the surface between a face and the point of the surface above a particle, and depth of
     /// the particle, m.
-    pub fn reach(&self, face: &Face<D>, point: [f64; D]) -> (f64, f64) {
+    pub fn reach(&self, face: &SurfaceFace<D>, point: [f64; D]) -> (f64, f64) {
         self.patches[face.patch as usize].reach(face, point)
     }
 
@@ -165,7 +166,7 @@ impl<const D: usize> Surface<D> {
     }
 
     /// Adds face points on all sides of a shape.
-    fn sample(&mut self, shape: &Shape<D>, outward: f64, columns: &Columns<D>) {
+    fn sample(&mut self, shape: &Shape<D>, outward: f64, columns: &CellColumns<D>) {
         match *shape {
             Shape::Box { min, max } => {
                 for axis in 0..D {
@@ -190,7 +191,7 @@ impl<const D: usize> Surface<D> {
                 self.flat(shape, axis, ends, outward, columns);
                 let patch = self.patch(Patch::Round { centre, radius, axis: Some(axis), outward });
                 let count = around(TAU * radius, columns.spacing);
-                for layer in (0..columns.counts[axis]).map(|k| columns.at(axis, k)) {
+                for layer in (0..columns.counts[axis]).map(|k| columns.coordinate(axis, k)) {
                     if layer <= ends.0 || layer >= ends.1 {
                         continue;
                     }
@@ -217,12 +218,19 @@ impl<const D: usize> Surface<D> {
         for k in 0..count {
             let (sin, cos) = (TAU * (k as f64 + 0.5) / count as f64).sin_cos();
             let (normal, place) = at(cos, sin);
-            self.faces.push(Face { place, normal: normal.map(|n| outward * n), patch });
+            self.faces.push(SurfaceFace { place, normal: normal.map(|n| outward * n), patch });
         }
     }
 
     /// Adds the points of both flat sides of a shape across an axis, above the columns of the lattice.
-    fn flat(&mut self, shape: &Shape<D>, axis: usize, ends: (f64, f64), outward: f64, columns: &Columns<D>) {
+    fn flat(
+        &mut self,
+        shape: &Shape<D>,
+        axis: usize,
+        ends: (f64, f64),
+        outward: f64,
+        columns: &CellColumns<D>,
+    ) {
         let middle = 0.5 * (ends.0 + ends.1);
         for (end, sign) in [(ends.0, -outward), (ends.1, outward)] {
             let patch = self.patch(Patch::Flat { axis, outward: sign });
@@ -235,12 +243,12 @@ impl<const D: usize> Surface<D> {
                     }
                     let cell = rest % columns.counts[d];
                     rest /= columns.counts[d];
-                    columns.at(d, cell)
+                    columns.coordinate(d, cell)
                 });
                 if shape.contains(place) {
                     place[axis] = end;
                     let normal = std::array::from_fn(|d| if d == axis { sign } else { 0.0 });
-                    self.faces.push(Face { place, normal, patch });
+                    self.faces.push(SurfaceFace { place, normal, patch });
                 }
             }
         }
@@ -248,14 +256,14 @@ impl<const D: usize> Surface<D> {
 }
 
 /// Columns of the lattice that fills a body.
-struct Columns<const D: usize> {
+struct CellColumns<const D: usize> {
     origin: [f64; D],
     counts: [usize; D],
     spacing: f64,
 }
 
-impl<const D: usize> Columns<D> {
-    fn at(&self, axis: usize, cell: usize) -> f64 {
+impl<const D: usize> CellColumns<D> {
+    fn coordinate(&self, axis: usize, cell: usize) -> f64 {
         self.origin[axis] + self.spacing * cell as f64
     }
 }

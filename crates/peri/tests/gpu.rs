@@ -1,7 +1,7 @@
 //! Lattices on a device against the kernel of the host.
 
 #[path = "it/bodies.rs"]
-#[allow(dead_code)] // of what all tests share
+#[allow(dead_code)] // shared by all tests
 mod bodies;
 
 use bodies::{Body, MODULUS, Random, fit, hold, laws, norm};
@@ -18,14 +18,15 @@ use peri::solver::{Breaking, Method, Policy, State, System, VelocityVerlet};
 
 const DENSITY: f64 = 2.3;
 
-/// Every precision of this machine's device; says that the test is skipped where there is none.
+/// Every precision of this machine's device; reports the test as skipped if there is none.
 #[track_caller]
 fn devices() -> Vec<Device> {
     let open = |precision| Device::portable()?.with_precision(precision);
     let found: Vec<Device> = [Precision::Single, Precision::Double].map(open).into_iter().flatten().collect();
     if found.is_empty() {
         evidence::skipped(
-            "a device behind Vulkan, Metal or DirectX 12 (a program that stands for one: mesa-vulkan-drivers)",
+            "a device behind Vulkan, Metal or DirectX 12 (a program that stands for one: \
+            mesa-vulkan-drivers)",
         );
     }
     found
@@ -40,13 +41,13 @@ fn random<const D: usize>(bonds: &LatticeBonds<D>, size: f64) -> Field<D> {
     field
 }
 
-/// Two slits and a hole; no correction that devices do not know.
+/// Two slits and a hole; no correction that devices do not support.
 fn damaged<const D: usize>(cells: [usize; D]) -> LatticeBonds<D> {
     Body { surface: None, ..Body::damaged(cells, 1e-3, 3.015) }.build().lattice
 }
 
-/// What rounding of displacements, of the law and of sums may make of a particle's force: with c = 2kθ w
-/// V/|ξ| and the rounding ε|ξ + η|(|u_I| + |u_J|) of E, of which q is a function, Σ_J c (|q| + |q′| |δE|/ε
+/// Bound of the effect of rounding of displacements, law and sums on a particle's force: with c = 2kθ w V/|ξ|
+/// and the rounding ε|ξ + η|(|u_I| + |u_J|) of E, of which q is a function, Σ_J c (|q| + |q′| |δE|/ε
 /// + |q|)|ζ|.
 fn sizes<const D: usize>(bonds: &LatticeBonds<D>, law: &KernelFit, u: &Field<D>) -> Vec<f64> {
     let of = |site: u32| {
@@ -70,7 +71,7 @@ fn compare_forces<const D: usize>(device: &Device, cells: [usize; D]) {
     let mut bonds = damaged(cells);
     let u = random(&bonds, 0.05);
     let all = bonds.directed_bonds();
-    bonds.sever(&overstretched(&bonds, &u, &1.05.into(), &peri::bonds::StretchScan::default()));
+    bonds.break_bonds(&overstretched(&bonds, &u, &1.05.into(), &peri::bonds::StretchScan::default()));
     assert!(bonds.directed_bonds() < all);
     let range = stretch_range(&bonds, &u);
     let range = [range.low, range.high].map(|e| (1.0 + e).sqrt()).map(|l| l + 1e-3 * (l - 1.0).signum());
@@ -105,8 +106,8 @@ fn gpu_forces_are_those_of_the_host() {
     }
 }
 
-/// A slit sheet or block that stretches evenly at first and whose ends go on to do so: bonds break beside
-/// slits and hole, on both sides the same.
+/// Compares a slit sheet or block that stretches evenly, at first and later at its ends: bonds break beside
+/// slits and hole, the same on host and device.
 fn compare_motion<const D: usize>(device: &Device, cells: [usize; D], critical: f64) {
     const STEPS: u64 = 60;
     let law = Law::ChainOffset.build(720.0, 1200.0, false).unwrap();
@@ -136,7 +137,7 @@ fn compare_motion<const D: usize>(device: &Device, cells: [usize; D], critical: 
 
     let mut state = State::new(bonds.sites());
     state.velocity = velocity.clone();
-    // how near any bond came to the critical stretch, whichever side it was on
+    // distance of any bond from the critical stretch, on either side of it
     let (mut margin, mut alive) = (f64::INFINITY, whole.intact());
     let mut system = System::new(&mut bonds, BondMaterial::new(&*law, MODULUS), &loads, &[]);
     system.breaking = Some(Breaking { criterion: critical.into(), policy: Policy::default() });
@@ -196,7 +197,7 @@ fn gpu_motion_breaks_the_same_bonds() {
     }
 }
 
-/// One particle moves in a straight line; a body without one is no body.
+/// A single particle moves in a straight line; a body without particles is refused.
 #[test]
 fn gpu_smallest_bodies() {
     devices().iter().for_each(smallest_bodies);
@@ -230,7 +231,7 @@ fn smallest_bodies(device: &Device) {
     assert!(LatticeBonds::new(empty, 3.015, VolumeCorrection::None, &[]).is_err());
 }
 
-/// What kernels cannot do is refused, and what is not finite is found, each by name.
+/// Unsupported features are refused and non-finite values located, each by name.
 #[test]
 fn gpu_refusals() {
     let Some(device) = devices().pop() else { return };
@@ -276,7 +277,7 @@ fn gpu_refusals() {
     assert!(body.start(&start).unwrap_err().to_string().contains("time step: found 0"));
 }
 
-/// A body that does not fit is refused by the name of what does not.
+/// A body that exceeds the memory is refused with the name of the buffer.
 #[test]
 fn gpu_bodies_beyond_the_memory() {
     let Some(device) = devices().pop() else { return };

@@ -3,8 +3,8 @@
 //! A particle occupies one or two rows of four numbers. Groups of as many rows as a vector has lanes are
 //! loaded whole and transposed by shuffles: with AVX2 and AVX-512 this takes 0.7 of the time of scalar loads.
 
-use super::kernel::{Pass, law};
-use super::real::Real;
+use super::kernel::{ForceKernel, law};
+use super::real::KernelReal;
 use crate::field::{CHUNK, Field};
 use crate::potential::StretchRange;
 use pulp::Simd;
@@ -20,18 +20,18 @@ const ROW: usize = 4;
 /// Positions and displacements of consecutive particles: (x, y, u_x, u_y) in a plane, in space (x, y, z, 0)
 /// and (u_x, u_y, u_z, 0).
 #[derive(Default)]
-pub struct Rows {
+pub struct ParticleRows {
     /// The first particle.
     first: usize,
     rows: Vec<[f64; ROW]>,
 }
 
-impl Rows {
+impl ParticleRows {
     /// Gathers these particles in a displacement.
     pub fn new<const D: usize>(position: &Field<D>, displacement: &Field<D>, range: Range<usize>) -> Self {
         let mut rows = Self { first: range.start, rows: vec![[0.0; ROW]; range.len() * (D - 1)] };
-        rows.place(position, 0);
-        rows.place(displacement, ROW * (D - 1) / 2);
+        rows.write(position, 0);
+        rows.write(displacement, ROW * (D - 1) / 2);
         rows
     }
 
@@ -46,12 +46,12 @@ impl Rows {
     }
 
     /// Returns true if these are `particles` particles from the first on.
-    pub fn are_of<const D: usize>(&self, particles: usize) -> bool {
+    pub fn has_particles<const D: usize>(&self, particles: usize) -> bool {
         self.first == 0 && self.rows.len() == particles * (D - 1)
     }
 
     /// Returns true if these are the rows of `sites` in this displacement.
-    pub fn holds<const D: usize>(&self, displacement: &Field<D>, sites: Range<usize>) -> bool {
+    pub fn matches<const D: usize>(&self, displacement: &Field<D>, sites: Range<usize>) -> bool {
         let rows = self.rows.as_flattened().chunks_exact(ROW * (D - 1)).skip(sites.start - self.first);
         sites.zip(rows).all(|(site, row)| {
             let moved = &row[ROW * (D - 1) / 2..][..D];
@@ -61,11 +61,11 @@ impl Rows {
 
     /// Loads another displacement.
     pub fn load<const D: usize>(&mut self, displacement: &Field<D>) {
-        self.place(displacement, ROW * (D - 1) / 2);
+        self.write(displacement, ROW * (D - 1) / 2);
     }
 
     /// Writes a vector of each particle, beginning with column `at` of its rows.
-    fn place<const D: usize>(&mut self, field: &Field<D>, at: usize) {
+    fn write<const D: usize>(&mut self, field: &Field<D>, at: usize) {
         let (first, components) = (self.first, field.components());
         self.rows.par_chunks_mut(CHUNK * (D - 1)).enumerate().for_each(|(chunk, rows)| {
             let sites = first + chunk * CHUNK..;
@@ -81,7 +81,7 @@ impl Rows {
 /// Input of the cloud kernel: compressed rows of neighbours.
 pub struct CloudData<'a, const D: usize> {
     /// All particles that a work item reads.
-    pub rows: &'a Rows,
+    pub rows: &'a ParticleRows,
     /// First bond of each particle, and the end of the last.
     pub starts: &'a [usize],
     /// Neighbour of each bond.
@@ -104,7 +104,7 @@ pub struct CloudPass<'a, const D: usize, const P: usize, const Q: usize> {
     pub clamp: [f64; 2],
 }
 
-impl<const D: usize, const P: usize, const Q: usize> Pass<D> for CloudPass<'_, D, P, Q> {
+impl<const D: usize, const P: usize, const Q: usize> ForceKernel<D> for CloudPass<'_, D, P, Q> {
     #[inline(always)]
     fn run<S: Simd>(
         &self,
@@ -133,7 +133,7 @@ impl<const D: usize, const P: usize, const Q: usize> Pass<D> for CloudPass<'_, D
             for first in (starts[own]..starts[own + 1]).step_by(lanes) {
                 let group = &neighbours[first..first + lanes];
                 // SAFETY: the rows hold every neighbour of this work item: those of all particles, of which
-                // there is one row or two each (asserted in `CloudBonds::force`), or those of `met_by`
+                // there is one row or two each (asserted in `CloudBonds::force`), or those of `reached_by`
                 let (x, u) = unsafe {
                     let whole = columns::<S, D>(simd, rows, 0, group, &order);
                     let (mut x, mut u) = ([zero; D], [zero; D]);
@@ -191,7 +191,7 @@ impl<const D: usize, const P: usize, const Q: usize> Pass<D> for CloudPass<'_, D
 #[inline(always)]
 unsafe fn columns<S: Simd, const D: usize>(
     simd: S,
-    rows: &Rows,
+    rows: &ParticleRows,
     at: usize,
     group: &[u32],
     order: &[usize; GROUP],

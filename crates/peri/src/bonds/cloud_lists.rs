@@ -90,7 +90,7 @@ impl NeighbourLists {
     }
 
     /// Severs bond `k` of a site: like padding, it becomes a bond of zero stiffness to the site itself.
-    pub(super) fn sever(&mut self, site: u32, k: usize) {
+    pub(super) fn break_bond(&mut self, site: u32, k: usize) {
         self.neighbours[k] = site;
         self.inverse_length[k] = 0.0;
         self.directed_bonds -= 1;
@@ -98,7 +98,7 @@ impl NeighbourLists {
 }
 
 /// Compressed rows, and the data that turn a volume into a weight.
-pub(super) struct Lists<'a> {
+pub(super) struct NeighbourRows<'a> {
     pub(super) starts: &'a [usize],
     pub(super) neighbours: &'a [u32],
     /// 1/|ξ|; 0 where broken.
@@ -107,7 +107,7 @@ pub(super) struct Lists<'a> {
     pub(super) partial: Option<[f64; 2]>,
 }
 
-impl Lists<'_> {
+impl NeighbourRows<'_> {
     /// V_J/|ξ|², V_J with its correction.
     #[inline(always)]
     pub(super) fn share(&self, inverse: f64, volume: f64) -> f64 {

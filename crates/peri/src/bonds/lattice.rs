@@ -1,16 +1,15 @@
-//! A regular lattice of particles: one stencil of offsets, a bit mask of intact bonds per particle, no
-//! neighbour list.
+//! A regular lattice: one stencil of offsets, a bit mask of intact bonds per particle, no neighbour list.
 
 mod connect;
 mod mixed;
 
-use super::lattice_kernel::{Class, Factors, TILE, Tiles};
+use super::lattice_kernel::{Factors, TILE, TileClass, Tiles};
 use super::lattice_sums::{GradientSums, Span, Spans, Weights};
 use super::rows::{LatticeKernel, StencilBond, lattice_kernel};
-use super::softening::{Softened, Softening, integrity};
+use super::softening::{Softened, SoftenedBonds, integrity};
 use super::stencil::{Stencil, fullest, layout, storage};
 use super::{
-    BodyGeometry, BondDamage, BondForces, Bonds, Kind, Neighbour, Overstretched, VolumeCorrection,
+    BodyGeometry, BondDamage, BondForces, BondKind, Bonds, Neighbour, Overstretched, VolumeCorrection,
     plain_force, refuse_one_sided, surface_weight,
 };
 use crate::error::Error;
@@ -36,18 +35,17 @@ pub struct LatticeBonds<const D: usize> {
     sites: usize,
     particles: Vec<u32>,
     intact: Vec<Vec<u64>>,
-    classes: Vec<Class>,
+    classes: Vec<TileClass>,
     factors: Option<Field<D>>,
     /// True if the factors are equal along all axes.
     even: bool,
-    /// Interior value of the factors, included in every stencil bond's weight; stored factors are relative to
-    /// it.
+    /// Interior value of the factors, part of each bond's weight; stored factors are relative to it.
     interior_factor: f64,
     kernel: Option<Box<dyn LatticeKernel<D>>>,
     /// A law that only a table represents, and kθ.
     table: Option<(KernelFit, f64)>,
     directed_bonds: u64,
-    softening: Softening,
+    softening: SoftenedBonds,
     mixed: Option<Mixed<D>>,
 }
 
@@ -55,9 +53,8 @@ impl<const D: usize> LatticeBonds<D> {
     /// Bonds all occupied cells within `ratio` spacings, except pairs that cross a cut.
     ///
     /// # Errors
-    /// [`Error::Geometry`] if no cell is occupied, the list of occupied cells does not fit the box, the
-    /// spacing is not positive, the horizon is not finite or reaches no neighbour, or memory does not
-    /// suffice.
+    /// [`Error::Geometry`] if no cell is occupied, the list of cells does not fit the box, the spacing is not
+    /// positive, the horizon is not finite or reaches no neighbour, or memory does not suffice.
     pub fn new(
         lattice: Lattice<D>,
         ratio: f64,
@@ -114,14 +111,14 @@ impl<const D: usize> LatticeBonds<D> {
             sites,
             particles: Vec::new(),
             intact: Vec::new(),
-            classes: vec![Class::Empty; sites / TILE],
+            classes: vec![TileClass::Empty; sites / TILE],
             factors: None,
             even: true,
             interior_factor: 1.0,
             kernel: None,
             table: None,
             directed_bonds: 0,
-            softening: Softening::default(),
+            softening: SoftenedBonds::default(),
             mixed: None,
             lattice,
         };
@@ -395,7 +392,7 @@ impl<const D: usize> BondForces<D> for LatticeBonds<D> {
 
     fn prepare(&mut self, displacement: &Field<D>) {
         if let Some(mixed) = &mut self.mixed {
-            mixed.round(displacement, self.lattice.spacing);
+            mixed.set_displacement(displacement, self.lattice.spacing);
         }
     }
 
@@ -442,7 +439,7 @@ impl<const D: usize> BondForces<D> for LatticeBonds<D> {
 }
 
 impl<const D: usize> BondDamage<D> for LatticeBonds<D> {
-    fn sever(&mut self, bonds: &[Overstretched]) {
+    fn break_bonds(&mut self, bonds: &[Overstretched]) {
         for bond in bonds {
             let (site, k) = (bond.site as usize, bond.index as usize);
             self.intact[k / 64][site] &= !(1 << (k % 64));
@@ -452,11 +449,11 @@ impl<const D: usize> BondDamage<D> for LatticeBonds<D> {
         tiles.dedup();
         for tile in tiles {
             let empty = (tile * TILE..(tile + 1) * TILE).all(|s| self.intact.iter().all(|w| w[s] == 0));
-            self.classes[tile] = if empty { Class::Empty } else { Class::Partial };
+            self.classes[tile] = if empty { TileClass::Empty } else { TileClass::Partial };
         }
     }
 
-    fn softening(&self) -> &Softening {
+    fn softening(&self) -> &SoftenedBonds {
         &self.softening
     }
 
@@ -496,7 +493,7 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
         self.sites * 8 * self.intact.len() + self.classes.len() + self.particles.len() * 4 + factors + mixed
     }
 
-    fn kind(&self) -> Kind<'_, D> {
-        Kind::Lattice(self)
+    fn kind(&self) -> BondKind<'_, D> {
+        BondKind::Lattice(self)
     }
 }

@@ -1,7 +1,7 @@
 //! The lattice kernel: vectors of neighbouring particles, one bond of the stencil at a time, without gather.
 
-use super::kernel::{Pass, law};
-use super::real::Real;
+use super::kernel::{ForceKernel, law};
+use super::real::KernelReal;
 use crate::potential::StretchRange;
 use pulp::Simd;
 
@@ -11,7 +11,7 @@ pub const TILE: usize = 16;
 /// A bond of the stencil with the law's coefficients scaled to its length and stiffness, for `P` numerator
 /// and `Q` denominator coefficients: q·c = E·ΣₖaₖEᵏ/(1 + ΣₖbₖEᵏ⁺¹), E = η·(2ξ + η).
 #[derive(Clone, Copy, Debug)]
-pub struct Row<T, const D: usize, const P: usize, const Q: usize> {
+pub struct StencilRow<T, const D: usize, const P: usize, const Q: usize> {
     /// Distance to the neighbour in sites.
     pub shift: isize,
     /// Reference bond ξ.
@@ -31,7 +31,7 @@ pub struct Row<T, const D: usize, const P: usize, const Q: usize> {
 /// Work that the particles of a tile need.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
-pub enum Class {
+pub enum TileClass {
     /// No particle has a bond.
     Empty,
     /// Every particle has every bond, with the stencil's own weight.
@@ -47,7 +47,7 @@ pub struct Tiles<'a, const D: usize, T = f64> {
     /// Bit k of word w at a site: bond 64w + k is intact.
     pub intact: &'a [Vec<u64>],
     /// Class of each tile.
-    pub classes: &'a [Class],
+    pub classes: &'a [TileClass],
     /// Per-particle correction factors g (see [`super::correction`]), if the scene asks for them.
     pub factors: Option<Factors<'a, D, T>>,
     /// Largest |shift|: sites closer than this to either end hold no particle.
@@ -69,7 +69,7 @@ impl<'a, const D: usize, T> Factors<'a, D, T> {
         if even { Self::Even(components[0]) } else { Self::Along(components) }
     }
 
-    fn are_of(&self, sites: usize) -> bool {
+    fn cover(&self, sites: usize) -> bool {
         match self {
             Self::Even(factors) => factors.len() == sites,
             Self::Along(factors) => factors.iter().all(|component| component.len() == sites),
@@ -80,14 +80,16 @@ impl<'a, const D: usize, T> Factors<'a, D, T> {
 /// The lattice kernel: tiles and rows.
 pub struct LatticePass<'a, T, const D: usize, const P: usize, const Q: usize> {
     /// The stencil.
-    pub rows: &'a [Row<T, D, P, Q>],
+    pub rows: &'a [StencilRow<T, D, P, Q>],
     /// The storage, in units of the rows.
     pub tiles: &'a Tiles<'a, D, T>,
     /// Unit of the rows' forces.
     pub unit: f64,
 }
 
-impl<T: Real, const D: usize, const P: usize, const Q: usize> Pass<D> for LatticePass<'_, T, D, P, Q> {
+impl<T: KernelReal, const D: usize, const P: usize, const Q: usize> ForceKernel<D>
+    for LatticePass<'_, T, D, P, Q>
+{
     /// `start` and the length are multiples of [`TILE`].
     #[inline(always)]
     fn run<S: Simd>(
@@ -108,17 +110,17 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> Pass<D> for Lattic
             self.tiles.intact.iter().all(|w| w.len() == sites)
                 && self.tiles.intact.len() * 64 >= self.rows.len()
         );
-        assert!(self.tiles.factors.is_none_or(|factors| factors.are_of(sites)));
+        assert!(self.tiles.factors.is_none_or(|factors| factors.cover(sites)));
         assert!(self.rows.iter().all(|r| r.shift.unsigned_abs() <= self.tiles.guard));
         let tracking = track.is_some();
-        let mut seen = [T::splat(simd, T::of(0.0)); 2];
+        let mut seen = [T::splat(simd, T::from_f64(0.0)); 2];
         for offset in (0..length).step_by(TILE) {
             let base = start + offset;
             let class = self.tiles.classes[base / TILE];
             for f in force.iter_mut() {
                 f[offset..offset + TILE].fill(0.0);
             }
-            if class == Class::Empty {
+            if class == TileClass::Empty {
                 continue;
             }
             assert!(base >= self.tiles.guard && base + TILE + self.tiles.guard <= sites);
@@ -136,7 +138,7 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> Pass<D> for Lattic
                 };
                 // SAFETY: see above; `out` has at least `step` elements left in its tile.
                 unsafe {
-                    match (class == Class::Full, pair) {
+                    match (class == TileClass::Full, pair) {
                         (true, true) => self.full::<S, 2>(simd, base + sub, out, tracking, &mut seen),
                         (true, false) => self.full::<S, 1>(simd, base + sub, out, tracking, &mut seen),
                         // at the end of a row: one vector
@@ -161,7 +163,7 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> Pass<D> for Lattic
     }
 }
 
-impl<T: Real, const D: usize, const P: usize, const Q: usize> LatticePass<'_, T, D, P, Q> {
+impl<T: KernelReal, const D: usize, const P: usize, const Q: usize> LatticePass<'_, T, D, P, Q> {
     /// Returns the number of rows whose stretches are tracked: rows of one direction visit every bond once.
     #[inline(always)]
     fn tracked(&self, tracking: bool) -> usize {
@@ -185,8 +187,8 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> LatticePass<'_, T,
         let [mut low, mut high] = *seen;
         let displacement = self.tiles.displacement;
         // SAFETY: as above
-        let own = unsafe { self.own::<S, V>(simd, base) };
-        let mut sum = [[T::splat(simd, T::of(0.0)); V]; D];
+        let own = unsafe { self.displacements::<S, V>(simd, base) };
+        let mut sum = [[T::splat(simd, T::from_f64(0.0)); V]; D];
         for rows in tracked.chunks(T::RUN) {
             for row in rows {
                 let inverse = T::splat(simd, row.inverse_square);
@@ -245,8 +247,8 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> LatticePass<'_, T,
         let tracked = self.tracked(tracking);
         let displacement = self.tiles.displacement;
         // SAFETY: as above
-        let own = unsafe { self.own::<S, V>(simd, base) };
-        let zero = T::splat(simd, T::of(0.0));
+        let own = unsafe { self.displacements::<S, V>(simd, base) };
+        let zero = T::splat(simd, T::from_f64(0.0));
         let mut sum = [[zero; V]; D];
         for (word, rows) in self.rows.chunks(64).enumerate() {
             let words = &self.tiles.intact[word][base..base + V * lanes];
@@ -351,7 +353,7 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> LatticePass<'_, T,
                 for v in 0..V {
                     // SAFETY: as above
                     unsafe { T::add_to(simd, out[d].add(v * T::lanes::<S>()), self.unit, sum[d][v]) };
-                    sum[d][v] = T::splat(simd, T::of(0.0));
+                    sum[d][v] = T::splat(simd, T::from_f64(0.0));
                 }
             }
         }
@@ -363,8 +365,8 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> LatticePass<'_, T,
     /// # Safety
     /// As [`Self::full`].
     #[inline(always)]
-    unsafe fn own<S: Simd, const V: usize>(&self, simd: S, base: usize) -> [[T::Vector<S>; D]; V] {
-        let mut own = [[T::splat(simd, T::of(0.0)); D]; V];
+    unsafe fn displacements<S: Simd, const V: usize>(&self, simd: S, base: usize) -> [[T::Vector<S>; D]; V] {
+        let mut own = [[T::splat(simd, T::from_f64(0.0)); D]; V];
         for v in 0..V {
             for d in 0..D {
                 // SAFETY: as above
@@ -375,7 +377,7 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> LatticePass<'_, T,
     }
 }
 
-impl<T: Real, const D: usize, const P: usize, const Q: usize> Row<T, D, P, Q> {
+impl<T: KernelReal, const D: usize, const P: usize, const Q: usize> StencilRow<T, D, P, Q> {
     /// Computes ζ of a bond of the particles from `here` on, and E = η·(2ξ + η) = |ζ|² − |ξ|².
     ///
     /// # Safety
@@ -388,7 +390,7 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> Row<T, D, P, Q> {
         own: &[T::Vector<S>; D],
         here: usize,
     ) -> ([T::Vector<S>; D], T::Vector<S>) {
-        let zero = T::splat(simd, T::of(0.0));
+        let zero = T::splat(simd, T::from_f64(0.0));
         let there = here.wrapping_add_signed(self.shift);
         let (mut e, mut zeta) = (zero, [zero; D]);
         for d in 0..D {
@@ -446,13 +448,13 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> Row<T, D, P, Q> {
             Factors::Even(factors) => {
                 // SAFETY: as above
                 let pair = unsafe { T::add(simd, T::load::<S>(factors, here), T::load::<S>(factors, there)) };
-                return T::mul(simd, pair, T::splat(simd, T::of(0.5)));
+                return T::mul(simd, pair, T::splat(simd, T::from_f64(0.5)));
             }
             Factors::Along(factors) => factors,
         };
-        let four = T::splat(simd, T::of(4.0));
+        let four = T::splat(simd, T::from_f64(4.0));
         let inverse = T::mul(simd, four, T::splat(simd, self.inverse_square));
-        let mut sum = T::splat(simd, T::of(0.0));
+        let mut sum = T::splat(simd, T::from_f64(0.0));
         for d in 0..D {
             let bond = T::splat(simd, self.bond[d]);
             // 4/(g_I + g_J)² = 1/ḡ²
@@ -462,6 +464,6 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> Row<T, D, P, Q> {
             let cosine = T::mul(simd, T::mul(simd, bond, bond), inverse);
             sum = T::add(simd, sum, T::div(simd, cosine, T::mul(simd, pair, pair)));
         }
-        T::div(simd, T::splat(simd, T::of(1.0)), T::sqrt(simd, sum))
+        T::div(simd, T::splat(simd, T::from_f64(1.0)), T::sqrt(simd, sum))
     }
 }

@@ -1,7 +1,7 @@
 //! Sums over the bonds of a lattice other than forces: stretches, energies, gradients; each bond seen from
 //! one end.
 
-use super::lattice_kernel::{Class, TILE, Tiles};
+use super::lattice_kernel::{TILE, TileClass, Tiles};
 use crate::potential::{StretchRange, TangentTable};
 use pulp::bytemuck::cast_slice;
 use pulp::{Arch, NullaryFnOnce, Simd, WithSimd};
@@ -47,7 +47,7 @@ impl<const D: usize> Spans<'_, D> {
     #[inline(always)]
     fn tiles<A: Add<D>>(&self, sites: Range<usize>, count: usize, add: &mut A) {
         let mut present = Vec::with_capacity(count);
-        for base in sites.step_by(TILE).filter(|base| self.tiles.classes[base / TILE] != Class::Empty) {
+        for base in sites.step_by(TILE).filter(|base| self.tiles.classes[base / TILE] != TileClass::Empty) {
             present.clear();
             for (word, words) in self.tiles.intact.iter().enumerate() {
                 let mut any = words[base..base + TILE].iter().fold(0, |any, bits| any | bits);
@@ -98,7 +98,7 @@ impl<const D: usize> Spans<'_, D> {
     /// Lists the bonds beyond e = `least` that begin in these sites, of one direction each: by site and bond
     /// of the stencil, from both ends.
     pub fn beyond(&self, sites: Range<usize>, least: f64) -> Vec<[u32; 2]> {
-        let mut found = Beyond { least, bonds: Vec::new() };
+        let mut found = BeyondScan { least, bonds: Vec::new() };
         self.sum(sites, self.spans.len() / 2, &mut found);
         found.bonds
     }
@@ -122,12 +122,12 @@ impl<const D: usize> Spans<'_, D> {
     /// Computes the sums of each site of whole tiles over all its bonds.
     pub fn gradient_sums(&self, sites: Range<usize>) -> Vec<GradientSums<D>> {
         let mut sums = vec![GradientSums::NONE; sites.len()];
-        Arch::new().dispatch(Gradients { spans: self, first: sites.start, sums: &mut sums });
+        Arch::new().dispatch(GradientKernel { spans: self, first: sites.start, sums: &mut sums });
         sums
     }
 
     fn sum<A: Add<D>>(&self, sites: Range<usize>, count: usize, add: &mut A) {
-        Arch::new().dispatch(Sum { spans: self, sites, count, add });
+        Arch::new().dispatch(TileSum { spans: self, sites, count, add });
     }
 }
 
@@ -137,14 +137,14 @@ trait Add<const D: usize> {
 }
 
 /// A sum, compiled as a whole for the instruction set.
-struct Sum<'a, 'b, const D: usize, A> {
+struct TileSum<'a, 'b, const D: usize, A> {
     spans: &'b Spans<'a, D>,
     sites: Range<usize>,
     count: usize,
     add: &'b mut A,
 }
 
-impl<const D: usize, A: Add<D>> NullaryFnOnce for Sum<'_, '_, D, A> {
+impl<const D: usize, A: Add<D>> NullaryFnOnce for TileSum<'_, '_, D, A> {
     type Output = ();
     #[inline(always)]
     fn call(self) {
@@ -172,12 +172,12 @@ impl<const D: usize> Add<D> for Extremes {
     }
 }
 
-struct Beyond {
+struct BeyondScan {
     least: f64,
     bonds: Vec<[u32; 2]>,
 }
 
-impl<const D: usize> Add<D> for Beyond {
+impl<const D: usize> Add<D> for BeyondScan {
     #[inline(always)]
     fn tile(&mut self, spans: &Spans<D>, base: usize, present: &[usize]) {
         for &k in present {
@@ -255,13 +255,13 @@ impl<const D: usize> GradientSums<D> {
 }
 
 /// Sums of whole tiles from `first` on, one vector of sites at a time.
-struct Gradients<'a, 'b, const D: usize> {
+struct GradientKernel<'a, 'b, const D: usize> {
     spans: &'b Spans<'a, D>,
     first: usize,
     sums: &'b mut [GradientSums<D>],
 }
 
-impl<const D: usize> WithSimd for Gradients<'_, '_, D> {
+impl<const D: usize> WithSimd for GradientKernel<'_, '_, D> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
@@ -269,7 +269,7 @@ impl<const D: usize> WithSimd for Gradients<'_, '_, D> {
         let zero = simd.splat_f64s(0.0);
         for (at, sums) in self.sums.chunks_mut(S::F64_LANES).enumerate() {
             let base = self.first + at * S::F64_LANES;
-            if tiles.classes[base / TILE] == Class::Empty {
+            if tiles.classes[base / TILE] == TileClass::Empty {
                 continue;
             }
             let (mut shape, mut change) = ([[zero; D]; D], [[zero; D]; D]);

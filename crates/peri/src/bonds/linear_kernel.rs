@@ -3,9 +3,9 @@
 //!
 //! Fields of `N` = 1 + D² components hold a scalar and then a tensor, row by row.
 
-use super::kernel::Pass;
-use super::lattice_kernel::{Class, TILE, Tiles};
-use super::real::Real;
+use super::kernel::ForceKernel;
+use super::lattice_kernel::{TILE, TileClass, Tiles};
+use super::real::KernelReal;
 use crate::potential::StretchRange;
 use pulp::{Arch, Simd, WithSimd};
 
@@ -81,7 +81,7 @@ impl<const D: usize, const N: usize> WithSimd for MomentPass<'_, D, N> {
         let mut moments = [[0.0; TILE]; N];
         for base in (start..start + length).step_by(TILE) {
             let class = tiles.classes[base / TILE];
-            if class == Class::Empty {
+            if class == TileClass::Empty {
                 continue;
             }
             assert!(base >= tiles.guard && base + TILE + tiles.guard <= sites);
@@ -89,7 +89,7 @@ impl<const D: usize, const N: usize> WithSimd for MomentPass<'_, D, N> {
                 // SAFETY: every site up to `guard` ≥ max|shift| from the tile lies in every slice.
                 let sums: [S::f64s; N] = unsafe {
                     match class {
-                        Class::Full => sums::<S, D, N, true>(simd, rows, tiles, base + sub),
+                        TileClass::Full => sums::<S, D, N, true>(simd, rows, tiles, base + sub),
                         _ => sums::<S, D, N, false>(simd, rows, tiles, base + sub),
                     }
                 };
@@ -140,7 +140,7 @@ unsafe fn sums<S: Simd, const D: usize, const N: usize, const FULL: bool>(
     sums
 }
 
-impl<const D: usize, const N: usize> Pass<D> for LinearPass<'_, D, N> {
+impl<const D: usize, const N: usize> ForceKernel<D> for LinearPass<'_, D, N> {
     #[inline(always)]
     fn run<S: Simd>(
         &self,
@@ -157,7 +157,7 @@ impl<const D: usize, const N: usize> Pass<D> for LinearPass<'_, D, N> {
         for offset in (0..length).step_by(TILE) {
             let base = start + offset;
             let class = self.tiles.classes[base / TILE];
-            if class == Class::Empty {
+            if class == TileClass::Empty {
                 force.iter_mut().for_each(|f| f[offset..offset + TILE].fill(0.0));
                 continue;
             }
@@ -166,7 +166,7 @@ impl<const D: usize, const N: usize> Pass<D> for LinearPass<'_, D, N> {
                 // SAFETY: as in the first pass.
                 let sum = unsafe {
                     match (class, track.is_some()) {
-                        (Class::Full, false) => self.sum::<S, true, false>(simd, base + sub, &mut seen),
+                        (TileClass::Full, false) => self.sum::<S, true, false>(simd, base + sub, &mut seen),
                         (_, false) => self.sum::<S, false, false>(simd, base + sub, &mut seen),
                         _ => self.sum::<S, false, true>(simd, base + sub, &mut seen),
                     }

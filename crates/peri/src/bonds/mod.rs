@@ -25,16 +25,16 @@ pub use breaking::{Fragment, Overstretched, StretchScan, components, fingerprint
 pub use cells::CellGrid;
 pub use cloud::CloudBonds;
 pub use cloud_kernel::GROUP;
-pub use cloud_linear::{CloudMoments, CloudPlaces, Columns};
+pub use cloud_linear::{CloudMoments, CloudPlaces, MomentColumns};
 pub use lattice::LatticeBonds;
 pub use lattice_kernel::TILE;
 pub use lattice_sums::GradientSums;
 pub(crate) use lattice_sums::Weights;
 pub use linear_kernel::{LinearRow, Moments};
 pub use property::Property;
-pub use softening::{Softened, Softening, among};
+pub use softening::{Softened, SoftenedBonds, among};
 pub use stencil::{Stencil, storage};
-pub use traits::{BodyGeometry, BondDamage, BondForces, Bonds, Kind, Neighbour};
+pub use traits::{BodyGeometry, BondDamage, BondForces, BondKind, Bonds, Neighbour};
 
 #[cfg(feature = "gpu")]
 pub(crate) use rows::{StencilBond, scaled_laws};
@@ -184,7 +184,7 @@ mod tests {
             let mut index = None;
             bonds.neighbours(site as usize, &mut |bond| index = index.or(Some(bond.index)));
             let index = index.unwrap();
-            bonds.sever(&[Overstretched { site, index, elongation: 0.0, length: 1.0, weight: 1.0 }]);
+            bonds.break_bonds(&[Overstretched { site, index, elongation: 0.0, length: 1.0, weight: 1.0 }]);
             assert_eq!(bonds.one_sided().map(|pair| pair[1]), Some(site as usize));
             assert!(refuse_one_sided(bonds).unwrap_err().to_string().contains("no counterpart"));
         }

@@ -41,7 +41,7 @@ impl Property {
 
     /// Value of the particle in a site.
     #[inline]
-    pub fn at(&self, site: usize) -> f64 {
+    pub fn value_at(&self, site: usize) -> f64 {
         self.values.get(site).copied().unwrap_or(self.greatest)
     }
 
@@ -60,7 +60,11 @@ impl Property {
     /// Value of a bond: that of the weaker of its ends, unless the bond is weaker than both.
     #[inline]
     pub fn weaker(&self, site: usize, other: usize) -> f64 {
-        let ends = if self.values.is_empty() { self.greatest } else { self.at(site).min(self.at(other)) };
+        let ends = if self.values.is_empty() {
+            self.greatest
+        } else {
+            self.value_at(site).min(self.value_at(other))
+        };
         if self.bonds.is_empty() {
             return ends;
         }

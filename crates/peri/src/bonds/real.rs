@@ -3,7 +3,7 @@
 use pulp::Simd;
 
 /// Scalar type of a lattice kernel, and vectors of it. Forces are summed in double precision in either case.
-pub trait Real: Copy + Send + Sync + 'static {
+pub trait KernelReal: Copy + Send + Sync + 'static {
     /// A vector with instructions `S`.
     type Vector<S: Simd>: Copy;
     /// Number of bonds summed in this precision; the sum is then added in double precision.
@@ -11,7 +11,7 @@ pub trait Real: Copy + Send + Sync + 'static {
     /// Number of lanes of a vector.
     fn lanes<S: Simd>() -> usize;
     /// Rounds to the nearest number.
-    fn of(value: f64) -> Self;
+    fn from_f64(value: f64) -> Self;
     /// Fills all lanes with a number.
     fn splat<S: Simd>(simd: S, value: Self) -> Self::Vector<S>;
     /// a + b.
@@ -60,7 +60,7 @@ pub trait Real: Copy + Send + Sync + 'static {
 macro_rules! real {
     ($real:ty, $run:expr, $vector:ident, $lanes:ident, $splat:ident, $least:ident, $greatest:ident;
      { $($name:ident = $operation:ident($($of:ident),*);)* } $($rest:item)*) => {
-        impl Real for $real {
+        impl KernelReal for $real {
             type Vector<S: Simd> = S::$vector;
             const RUN: usize = $run;
             #[inline(always)]
@@ -68,7 +68,7 @@ macro_rules! real {
                 S::$lanes
             }
             #[inline(always)]
-            fn of(value: f64) -> Self {
+            fn from_f64(value: f64) -> Self {
                 value as $real
             }
             #[inline(always)]

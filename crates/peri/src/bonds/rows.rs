@@ -2,8 +2,8 @@
 
 use super::cloud_kernel::{CloudData, CloudPass};
 use super::kernel::dispatch;
-use super::lattice_kernel::{LatticePass, Row, Tiles};
-use super::real::Real;
+use super::lattice_kernel::{LatticePass, StencilRow, Tiles};
+use super::real::KernelReal;
 use crate::potential::{KernelFit, StretchRange};
 use std::any::Any;
 
@@ -20,7 +20,7 @@ pub struct StencilBond<const D: usize> {
 
 /// A lattice kernel with its law in place.
 pub trait LatticeKernel<const D: usize, T = f64>: Send + Sync {
-    /// Runs [`super::kernel::Pass::run`]; `tiles` in the unit of length of the stencil.
+    /// Runs [`super::kernel::ForceKernel::run`]; `tiles` in the unit of length of the stencil.
     fn run(
         &self,
         tiles: &Tiles<D, T>,
@@ -32,7 +32,7 @@ pub trait LatticeKernel<const D: usize, T = f64>: Send + Sync {
 
 /// A cloud kernel with its law in place.
 pub trait CloudKernel<const D: usize>: Send + Sync {
-    /// Runs [`super::kernel::Pass::run`].
+    /// Runs [`super::kernel::ForceKernel::run`].
     fn run(
         &self,
         data: &CloudData<D>,
@@ -43,11 +43,11 @@ pub trait CloudKernel<const D: usize>: Send + Sync {
 }
 
 struct LatticeRows<T, const D: usize, const P: usize, const Q: usize> {
-    rows: Vec<Row<T, D, P, Q>>,
+    rows: Vec<StencilRow<T, D, P, Q>>,
     unit: f64,
 }
 
-impl<T: Real, const D: usize, const P: usize, const Q: usize> LatticeKernel<D, T>
+impl<T: KernelReal, const D: usize, const P: usize, const Q: usize> LatticeKernel<D, T>
     for LatticeRows<T, D, P, Q>
 {
     fn run(
@@ -61,9 +61,9 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> LatticeKernel<D, T
     }
 }
 
-struct CloudLaw<const P: usize, const Q: usize>((f64, [f64; P], [f64; Q]), [f64; 2]);
+struct CompiledCloudLaw<const P: usize, const Q: usize>((f64, [f64; P], [f64; Q]), [f64; 2]);
 
-impl<const D: usize, const P: usize, const Q: usize> CloudKernel<D> for CloudLaw<P, Q> {
+impl<const D: usize, const P: usize, const Q: usize> CloudKernel<D> for CompiledCloudLaw<P, Q> {
     fn run(
         &self,
         data: &CloudData<D>,
@@ -102,7 +102,7 @@ impl Rational {
     }
 }
 
-/// Law of a bond of the stencil: coefficients in E = |ξ|² e, times the bond's stiffness; see [`Row`].
+/// Law of a bond of the stencil: coefficients in E = |ξ|² e, times the bond's stiffness; see [`StencilRow`].
 pub struct ScaledLaw {
     /// 1/|ξ|².
     pub inverse_square: f64,
@@ -140,8 +140,8 @@ pub fn scaled_laws<const D: usize>(fit: &KernelFit, stencil: &[StencilBond<D>]) 
     Some(stencil.iter().map(|bond| law.scaled(bond)).collect())
 }
 
-fn padded<T: Real, const N: usize>(values: &[f64]) -> [T; N] {
-    std::array::from_fn(|k| T::of(values.get(k).copied().unwrap_or(0.0)))
+fn padded<T: KernelReal, const N: usize>(values: &[f64]) -> [T; N] {
+    std::array::from_fn(|k| T::from_f64(values.get(k).copied().unwrap_or(0.0)))
 }
 
 /// Compiled sizes (numerator, denominator); a fit is padded with zeros to the first that holds it.
@@ -244,19 +244,19 @@ fn same<A: 'static, B: 'static>(value: A) -> Option<B> {
     (&mut value as &mut dyn Any).downcast_mut::<Option<B>>()?.take()
 }
 
-fn lattice_rows<T: Real, const D: usize, const P: usize, const Q: usize>(
+fn lattice_rows<T: KernelReal, const D: usize, const P: usize, const Q: usize>(
     law: &Rational,
     stencil: &[StencilBond<D>],
     unit: f64,
 ) -> Box<dyn LatticeKernel<D, T>> {
     let row = |bond: &StencilBond<D>| {
         let scaled = law.scaled(bond);
-        Row {
+        StencilRow {
             shift: bond.shift,
-            bond: bond.bond.map(T::of),
-            inverse_square: T::of(scaled.inverse_square),
-            clamp: scaled.clamp.map(T::of),
-            constant: T::of(scaled.constant),
+            bond: bond.bond.map(T::from_f64),
+            inverse_square: T::from_f64(scaled.inverse_square),
+            clamp: scaled.clamp.map(T::from_f64),
+            constant: T::from_f64(scaled.constant),
             numerator: padded(&scaled.numerator),
             denominator: padded(&scaled.denominator),
         }
@@ -281,5 +281,5 @@ fn single_rows<const D: usize, const P: usize, const Q: usize>(
 
 fn cloud_law<const D: usize, const P: usize, const Q: usize>(law: &Rational) -> Box<dyn CloudKernel<D>> {
     let coefficients = (law.constant, padded(&law.numerator), padded(&law.denominator));
-    Box::new(CloudLaw::<P, Q>(coefficients, law.clamp))
+    Box::new(CompiledCloudLaw::<P, Q>(coefficients, law.clamp))
 }

@@ -18,12 +18,12 @@ pub struct Softened {
 
 /// The damaged bonds of a body, each from both ends, by site and index. All others are intact or severed.
 #[derive(Clone, Debug, Default)]
-pub struct Softening {
+pub struct SoftenedBonds {
     bonds: Vec<Softened>,
     revision: u64,
 }
 
-impl Softening {
+impl SoftenedBonds {
     /// All damaged bonds.
     pub fn bonds(&self) -> &[Softened] {
         &self.bonds

@@ -1,7 +1,7 @@
 //! Traits of a bonded body: its geometry, the forces of its bonds, and their damage.
 
 use super::lattice_sums::GradientSums;
-use super::{CloudBonds, LatticeBonds, Overstretched, Softened, Softening};
+use super::{CloudBonds, LatticeBonds, Overstretched, Softened, SoftenedBonds};
 use crate::field::{CHUNK, Field};
 use crate::potential::{EnergyTable, KernelFit, StretchRange, TangentTable};
 use rayon::prelude::*;
@@ -153,9 +153,9 @@ pub trait BondForces<const D: usize>: BodyGeometry<D> {
 /// Damage of bonds.
 pub trait BondDamage<const D: usize>: BodyGeometry<D> {
     /// Severs bonds, each given from both ends.
-    fn sever(&mut self, bonds: &[Overstretched]);
+    fn break_bonds(&mut self, bonds: &[Overstretched]);
     /// Damaged bonds (integrity below 1).
-    fn softening(&self) -> &Softening;
+    fn softening(&self) -> &SoftenedBonds;
     /// Replaces the softened bonds, each given from both ends: [`BodyGeometry::neighbours`] weighs them by
     /// their integrity, [`BondForces::force`] does not.
     fn soften(&mut self, bonds: Vec<Softened>);
@@ -171,7 +171,7 @@ pub trait BondDamage<const D: usize>: BodyGeometry<D> {
 }
 
 /// The two representations, for functions that only one of them has.
-pub enum Kind<'a, const D: usize> {
+pub enum BondKind<'a, const D: usize> {
     /// A regular lattice.
     Lattice(&'a LatticeBonds<D>),
     /// A cloud.
@@ -183,9 +183,9 @@ pub trait Bonds<const D: usize>: BondForces<D> + BondDamage<D> {
     /// Bytes held for bonds and particles.
     fn bytes(&self) -> usize;
     /// Representation of these bonds.
-    fn kind(&self) -> Kind<'_, D>;
+    fn kind(&self) -> BondKind<'_, D>;
     /// The lattice behind these bonds, if there is one.
     fn as_lattice(&self) -> Option<&LatticeBonds<D>> {
-        if let Kind::Lattice(lattice) = self.kind() { Some(lattice) } else { None }
+        if let BondKind::Lattice(lattice) = self.kind() { Some(lattice) } else { None }
     }
 }

@@ -12,8 +12,8 @@
 
 use crate::bonds::{BodyGeometry, Bonds, CellGrid};
 use crate::field::Field;
-use crate::material::{Tensor, surface_load};
-use crate::surface::{Face, Surface};
+use crate::material::{BodyTensor, surface_load};
+use crate::surface::{BodySurface, SurfaceFace};
 use nalgebra::{SMatrix, SVector};
 use rayon::prelude::*;
 
@@ -53,7 +53,7 @@ pub struct Faces<const D: usize> {
 
 /// A particle below a face.
 #[derive(Clone, Copy)]
-struct Below {
+struct FaceParticle {
     face: u32,
     site: u32,
     /// ψ_f(I), and the depth, m.
@@ -67,16 +67,16 @@ impl<const D: usize> Faces<D> {
     ///
     /// `tied` faces have r_f = 0: the weights gain a term along the normal as well, so that faces rotate with
     /// the body.
-    pub fn new(bonds: &dyn Bonds<D>, surface: &Surface<D>, tied: bool) -> Self {
+    pub fn new(bonds: &dyn Bonds<D>, surface: &BodySurface<D>, tied: bool) -> Self {
         let area = typical_area(bonds);
-        let load = surface_load(bonds, Tensor::<D>::identity());
+        let load = surface_load(bonds, BodyTensor::<D>::identity());
         let mut below = below(bonds, surface);
-        let share = |below: &Below| {
+        let share = |below: &FaceParticle| {
             let (site, normal) = (below.site as usize, surface.faces()[below.face as usize].normal);
             let load = load.get(site);
             below.hat * bonds.volume(site) * (0..D).map(|d| load[d] * normal[d]).sum::<f64>()
         };
-        let sum = |below: &[Below]| {
+        let sum = |below: &[FaceParticle]| {
             let mut areas = vec![0.0; surface.faces().len()];
             below.iter().for_each(|below| areas[below.face as usize] += share(below));
             areas
@@ -239,7 +239,7 @@ pub fn typical_area<const D: usize>(bonds: &dyn BodyGeometry<D>) -> f64 {
 
 /// Lists all particles below faces, each nearer to its face than to an opposite one; hats sum to 1 over the
 /// faces of a patch.
-fn below<const D: usize>(bonds: &dyn BodyGeometry<D>, surface: &Surface<D>) -> Vec<Below> {
+fn below<const D: usize>(bonds: &dyn BodyGeometry<D>, surface: &BodySurface<D>) -> Vec<FaceParticle> {
     let (faces, spacing) = (surface.faces(), bonds.spacing());
     if faces.is_empty() {
         return Vec::new();
@@ -247,17 +247,17 @@ fn below<const D: usize>(bonds: &dyn BodyGeometry<D>, surface: &Surface<D>) -> V
     let (depth, width) = (DEPTH * bonds.horizon(), HAT * spacing);
     let places: Vec<[f64; D]> = faces.iter().map(|face| face.place).collect();
     let grid = CellGrid::new(&places, depth);
-    let of = |site: u32, all: &mut Vec<Below>| {
+    let of = |site: u32, all: &mut Vec<FaceParticle>| {
         let here = bonds.position(site as usize);
-        let mut near: Vec<Below> = Vec::new();
+        let mut near: Vec<FaceParticle> = Vec::new();
         grid.near(here, depth.hypot(width), |number| {
             let (aside, down) = surface.reach(&faces[number], here);
             if aside < width && down > 0.0 && down < depth {
-                near.push(Below { face: number as u32, site, hat: 1.0 - aside / width, depth: down });
+                near.push(FaceParticle { face: number as u32, site, hat: 1.0 - aside / width, depth: down });
             }
         });
         near.sort_unstable_by_key(|below| (faces[below.face as usize].patch, below.face));
-        let opposed = |own: &Below| {
+        let opposed = |own: &FaceParticle| {
             let normal = faces[own.face as usize].normal;
             near.iter().any(|other| {
                 let there = faces[other.face as usize].normal;
@@ -268,11 +268,11 @@ fn below<const D: usize>(bonds: &dyn BodyGeometry<D>, surface: &Surface<D>) -> V
         for patch in near.chunk_by(|a, b| faces[a.face as usize].patch == faces[b.face as usize].patch) {
             // the nearest step of a staircase
             let nearest = patch.iter().map(|below| below.depth).fold(f64::INFINITY, f64::min);
-            let kept = |below: &&Below| below.depth < nearest + 0.75 * spacing;
+            let kept = |below: &&FaceParticle| below.depth < nearest + 0.75 * spacing;
             let sum: f64 = patch.iter().filter(kept).map(|below| below.hat).sum();
-            let own = |below: &&Below| !surface.is_bound(below.face as usize) && !opposed(below);
+            let own = |below: &&FaceParticle| !surface.is_bound(below.face as usize) && !opposed(below);
             for below in patch.iter().filter(kept).filter(own) {
-                all.push(Below { hat: below.hat / sum, ..*below });
+                all.push(FaceParticle { hat: below.hat / sum, ..*below });
             }
         }
     };
@@ -281,15 +281,15 @@ fn below<const D: usize>(bonds: &dyn BodyGeometry<D>, surface: &Surface<D>) -> V
         sites.iter().for_each(|&site| of(site, &mut all));
         all
     };
-    let parts: Vec<Vec<Below>> = bonds.particles().par_chunks(BATCH).map(batch).collect();
+    let parts: Vec<Vec<FaceParticle>> = bonds.particles().par_chunks(BATCH).map(batch).collect();
     parts.concat()
 }
 
 /// Moves the particles of small faces to the nearest larger face of the same patch.
 fn join_small<const D: usize>(
-    surface: &Surface<D>,
+    surface: &BodySurface<D>,
     areas: &[f64],
-    below: &mut [Below],
+    below: &mut [FaceParticle],
     area: f64,
     spacing: f64,
 ) {
@@ -323,8 +323,8 @@ fn join_small<const D: usize>(
 /// m.
 fn centre<const D: usize>(
     bonds: &dyn BodyGeometry<D>,
-    face: &Face<D>,
-    group: &[Below],
+    face: &SurfaceFace<D>,
+    group: &[FaceParticle],
     weights: &mut [f64],
     tied: bool,
 ) -> f64 {
@@ -332,11 +332,11 @@ fn centre<const D: usize>(
     // mostly near the surface
     let measure: Vec<f64> = group.iter().map(|below| below.hat * (-below.depth / spacing).exp()).collect();
     let total: f64 = measure.iter().sum();
-    let from = |below: &Below| {
+    let from = |below: &FaceParticle| {
         let here = bonds.position(below.site as usize);
         SVector::<f64, D>::from_fn(|d, _| (here[d] - face.place[d]) / spacing)
     };
-    let aside = |below: &Below| {
+    let aside = |below: &FaceParticle| {
         let from = from(below);
         if tied { from } else { from - normal * normal.dot(&from) }
     };

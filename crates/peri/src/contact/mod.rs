@@ -23,13 +23,13 @@
 //! stays there. Force and energy are finite at full overlap (r = 0: kd along the reference ξ; energy ½kd² V_I
 //! V_J), so larger loads press particles through each other.
 //!
-//! Planes act on faces, see `faces`. Friction is Coulomb's with an elastic slip, see `grip`: equal and
-//! opposite within a pair, but not along it. Particles have no spin, so friction does not conserve angular
-//! momentum.
+//! Planes act on faces, see `faces`. Friction is Coulomb's with an elastic slip, see `friction_pair`: equal
+//! and opposite within a pair, but not along it. Particles have no spin, so friction does not conserve
+//! angular momentum.
 
 mod faces;
 mod friction;
-mod grip;
+mod friction_pair;
 mod list;
 mod plane;
 mod plane_friction;
@@ -41,18 +41,18 @@ mod vicinity;
 use crate::bonds::{BodyGeometry, Bonds, LatticeBonds, Property};
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
-use crate::surface::Surface;
-pub use friction::Sliding;
-pub use grip::{Drag, Grip, Pair};
-use list::{List, Listed, Near};
-pub use plane::{Plane, PlaneReaction};
+use crate::surface::BodySurface;
+pub use friction::SlidingFriction;
+pub use friction_pair::{ContactPair, Drag, FrictionPair};
+use list::{ContactList, ListedParticle, NearbyParticle};
+pub use plane::{PlaneReaction, RigidPlane};
 use planes::Planes;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 pub use stiffness::Spring;
 use ties::Ties;
-pub use ties::{Interface, across, grips};
+pub use ties::{GripInterface, across, grips};
 
 /// κ of Macek & Silling (2007).
 pub const SHORT_RANGE: f64 = 15.0;
@@ -75,14 +75,14 @@ pub struct Contact<const D: usize> {
     largest_volume: f64,
     /// Largest gap of particles about to touch, m.
     near: f64,
-    list: List<D>,
+    list: ContactList<D>,
     planes: Option<Planes<D>>,
     ties: Option<Ties<D>>,
     /// μ of pairs of particles, and γ, m.
     friction: f64,
     elastic_slip: Option<f64>,
     /// Active friction, sorted by pair, and the displacement from which it counts.
-    held: Vec<Grip>,
+    held: Vec<FrictionPair>,
     start: Option<Field<D>>,
 }
 
@@ -125,8 +125,8 @@ impl<const D: usize> Contact<D> {
         let moduli = modulus
             .uniform()
             .is_none()
-            .then(|| Property::new(bonds, |site, _| modulus.at(site) / modulus.greatest()));
-        Ok(Self { moduli, layered: true, ..Self::of_pairs(bonds, unit, stiffness)? })
+            .then(|| Property::new(bonds, |site, _| modulus.value_at(site) / modulus.greatest()));
+        Ok(Self { moduli, layered: true, ..Self::with_stiffness(bonds, unit, stiffness)? })
     }
 
     /// Contact of a body with the bond modulus `modulus` = kθ, N/m⁶, and κ = `stiffness`, see
@@ -138,12 +138,12 @@ impl<const D: usize> Contact<D> {
         positive("modulus of contact", modulus)?;
         let unit = 6.0 * modulus / bonds.horizon();
         // the same bits as κ·6kθ/δ
-        let mut contact = Self::of_pairs(bonds, unit, stiffness)?;
+        let mut contact = Self::with_stiffness(bonds, unit, stiffness)?;
         contact.stiffness = stiffness * 6.0 * modulus / bonds.horizon();
         Ok(contact)
     }
 
-    fn of_pairs(bonds: &dyn BodyGeometry<D>, unit: f64, stiffness: f64) -> Result<Self, Error> {
+    fn with_stiffness(bonds: &dyn BodyGeometry<D>, unit: f64, stiffness: f64) -> Result<Self, Error> {
         non_negative("contact.stiffness", stiffness)?;
         let volumes = bonds.particles().iter().map(|&site| bonds.volume(site as usize));
         let near = NEAR * bonds.spacing();
@@ -153,7 +153,7 @@ impl<const D: usize> Contact<D> {
             moduli: None,
             largest_volume: volumes.fold(0.0, f64::max),
             near,
-            list: List::new(bonds, near),
+            list: ContactList::new(bonds, near),
             planes: None,
             ties: None,
             friction: 0.0,
@@ -172,9 +172,9 @@ impl<const D: usize> Contact<D> {
     pub fn with_planes(
         mut self,
         bonds: &dyn Bonds<D>,
-        surface: &Surface<D>,
+        surface: &BodySurface<D>,
         modulus: impl Into<Property>,
-        planes: Vec<Plane<D>>,
+        planes: Vec<RigidPlane<D>>,
     ) -> Result<Self, Error> {
         if !planes.is_empty() {
             let modulus = modulus.into();
@@ -194,8 +194,8 @@ impl<const D: usize> Contact<D> {
     pub fn with_tied(
         mut self,
         bonds: &LatticeBonds<D>,
-        interface: Interface<D>,
-        outside: &Surface<D>,
+        interface: GripInterface<D>,
+        outside: &BodySurface<D>,
         modulus: f64,
         stiffness: f64,
     ) -> Result<Self, Error> {
@@ -244,7 +244,7 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Returns true if a friction coefficient is above 0.
-    pub fn rubs(&self) -> bool {
+    pub fn has_friction(&self) -> bool {
         (self.has_pairs() && self.friction > 0.0)
             || self.planes().any(|plane| plane.friction > 0.0 && !plane.bonded)
     }
@@ -255,14 +255,14 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Moves planes to their positions at a load factor and a time, s.
-    pub fn place(&mut self, factor: f64, time: f64) {
+    pub fn move_planes(&mut self, factor: f64, time: f64) {
         if let Some(planes) = &mut self.planes {
-            planes.place(factor, time);
+            planes.move_to(factor, time);
         }
     }
 
     /// The planes, in their order.
-    pub fn planes(&self) -> impl Iterator<Item = &Plane<D>> {
+    pub fn planes(&self) -> impl Iterator<Item = &RigidPlane<D>> {
         self.planes.iter().flat_map(Planes::planes)
     }
 
@@ -277,17 +277,17 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Force, area and width of the contact with each plane, without friction.
-    pub fn resting(&self, displacement: &Field<D>) -> Vec<PlaneReaction> {
-        self.planes.as_ref().map_or_else(Vec::new, |planes| planes.resting(displacement))
+    pub fn plane_reactions(&self, displacement: &Field<D>) -> Vec<PlaneReaction> {
+        self.planes.as_ref().map_or_else(Vec::new, |planes| planes.reactions(displacement))
     }
 
     /// Sum of the squares of the planes' force densities at the last update, (N/m³)².
-    pub fn square_of_planes(&self) -> f64 {
+    pub fn plane_force_square(&self) -> f64 {
         self.planes.as_ref().map_or(0.0, Planes::square)
     }
 
     /// Force densities of the planes at the last update, N/m³; `None` without planes.
-    pub fn of_planes(&self, sites: usize) -> Option<Field<D>> {
+    pub fn plane_forces(&self, sites: usize) -> Option<Field<D>> {
         let planes = self.planes.as_ref()?;
         let mut field = Field::zeros(sites);
         let chunks = field.chunks_mut().into_par_iter().enumerate();
@@ -315,27 +315,28 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Adds the pairs of sites whose bonds have just broken, each from both ends.
-    pub fn part(&mut self, bonds: &dyn BodyGeometry<D>, pairs: &[[u32; 2]]) {
+    pub fn add_broken_pairs(&mut self, bonds: &dyn BodyGeometry<D>, pairs: &[[u32; 2]]) {
         if self.has_pairs() {
-            self.list.part(bonds, pairs);
+            self.list.add_broken_pairs(bonds, pairs);
         }
         if let Some(planes) = &mut self.planes {
-            planes.lose(bonds, pairs.iter().map(|pair| pair[0] as usize));
+            planes.expose(bonds, pairs.iter().map(|pair| pair[0] as usize));
         }
     }
 
-    /// Rebuilds the list for a displacement; required after bonds change other than by [`Self::part`].
+    /// Rebuilds the list for a displacement; required after bonds change other than by
+    /// [`Self::add_broken_pairs`].
     pub fn rebuild(&mut self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) {
         self.list.rebuild(bonds, displacement);
         if let Some(planes) = &mut self.planes {
-            planes.lose(bonds, bonds.particles().iter().map(|&site| site as usize));
+            planes.expose(bonds, bonds.particles().iter().map(|&site| site as usize));
         }
     }
 
     /// Stiffness of a pair, N/m⁷.
     fn pair(&self, own: u32, other: u32) -> f64 {
         let Some(moduli) = &self.moduli else { return self.stiffness };
-        let [a, b] = [own, other].map(|site| moduli.at(site as usize));
+        let [a, b] = [own, other].map(|site| moduli.value_at(site as usize));
         self.stiffness * 2.0 * a * b / (a + b)
     }
 
@@ -347,7 +348,7 @@ impl<const D: usize> Contact<D> {
         displacement: &'a Field<D>,
         sites: Range<usize>,
         gap: f64,
-    ) -> impl Iterator<Item = (Listed, impl Iterator<Item = Near<D>> + 'a)> + 'a {
+    ) -> impl Iterator<Item = (ListedParticle, impl Iterator<Item = NearbyParticle<D>> + 'a)> + 'a {
         self.has_pairs().then(|| self.list.pairs(bonds, displacement, sites, gap)).into_iter().flatten()
     }
 
@@ -402,7 +403,7 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Counts and measures all contacts.
-    pub fn touching(&self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) -> ContactSummary {
+    pub fn summary(&self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) -> ContactSummary {
         let none = ContactSummary { pairs: 0, overlap: 0.0, energy: 0.0 };
         let of = |chunk: usize| {
             let (mut part, sites) = (none, chunk_range(chunk, displacement.sites()));
@@ -427,7 +428,7 @@ impl<const D: usize> Contact<D> {
             energy: a.energy + b.energy,
         });
         if let Some(planes) = &self.planes {
-            let (count, overlap, energy) = planes.touching(displacement);
+            let (count, overlap, energy) = planes.summary(displacement);
             all.pairs += count;
             all.energy += energy;
             all.overlap = all.overlap.max(overlap);

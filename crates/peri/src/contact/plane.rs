@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// pressure s(M/Δx)o, with the longitudinal modulus M and the spacing Δx: s layers of confined material are
 /// as stiff as the contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Plane<const D: usize> {
+pub struct RigidPlane<const D: usize> {
     /// A point of the plane, m.
     pub point: [f64; D],
     /// Normal, of any length, towards the body.
@@ -29,7 +29,7 @@ pub struct Plane<const D: usize> {
     pub velocity: [f64; D],
 }
 
-impl<const D: usize> Plane<D> {
+impl<const D: usize> RigidPlane<D> {
     /// A plane at rest, without friction, of stiffness [`super::PLANE_STIFFNESS`].
     pub fn new(point: [f64; D], normal: [f64; D]) -> Self {
         Self {

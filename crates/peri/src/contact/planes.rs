@@ -1,13 +1,13 @@
 //! Contact of faces and particles with rigid planes.
 
 use super::faces::Faces;
-use super::grip::{Grip, Pair};
-use super::plane::{Plane, PlaneReaction};
+use super::friction_pair::{ContactPair, FrictionPair};
+use super::plane::{PlaneReaction, RigidPlane};
 use crate::bonds::{BodyGeometry, Bonds, Property};
 use crate::error::Error;
 use crate::field::Field;
 use crate::geometry::length;
-use crate::surface::Surface;
+use crate::surface::BodySurface;
 use rayon::prelude::*;
 
 /// Distance of a face from a plane up to which it is tied to it, in spacings.
@@ -16,8 +16,8 @@ const TIED: f64 = 0.5;
 const BATCH: usize = 1024;
 
 /// A plane in motion.
-pub(super) struct Placed<const D: usize> {
-    pub(super) plane: Plane<D>,
+pub(super) struct MovingPlane<const D: usize> {
+    pub(super) plane: RigidPlane<D>,
     /// Displacement of the plane now and at the last placement, m.
     pub(super) now: [f64; D],
     pub(super) before: [f64; D],
@@ -27,7 +27,7 @@ pub(super) struct Placed<const D: usize> {
 
 /// A face, or a particle exposed to planes, beside a plane.
 #[derive(Clone, Copy)]
-pub(super) struct Touch<const D: usize> {
+pub(super) struct PlaneContact<const D: usize> {
     /// Number of a face, or number of faces plus the number of a bare particle.
     pub(super) element: usize,
     /// Position, m; of a particle, on its surface.
@@ -41,7 +41,7 @@ pub(super) struct Touch<const D: usize> {
     pub(super) stiffness: f64,
 }
 
-impl<const D: usize> Touch<D> {
+impl<const D: usize> PlaneContact<D> {
     /// Energy, J.
     fn energy(&self) -> f64 {
         let square = self.offset.map_or(self.overlap * self.overlap, |x| x.iter().map(|x| x * x).sum());
@@ -60,7 +60,7 @@ impl<const D: usize> Touch<D> {
 /// All planes of a scene with the elements they act on: faces of the body, and particles that have lost
 /// bonds.
 pub struct Planes<const D: usize> {
-    pub(super) each: Vec<Placed<D>>,
+    pub(super) each: Vec<MovingPlane<D>>,
     pub(super) faces: Faces<D>,
     /// True for faces whose particles have all their bonds.
     sound: Vec<bool>,
@@ -89,12 +89,13 @@ impl<const D: usize> Planes<D> {
     /// Places planes at rest beside a body; `modulus` is M, Pa, and `radius` that of a particle, m.
     ///
     /// # Errors
-    /// [`Error::Parameter`] as for [`Plane`]; [`Error::Geometry`] for a bonded plane that touches no face.
+    /// [`Error::Parameter`] as for [`RigidPlane`]; [`Error::Geometry`] for a bonded plane that touches no
+    /// face.
     pub fn new(
         bonds: &dyn Bonds<D>,
-        surface: &Surface<D>,
+        surface: &BodySurface<D>,
         modulus: &Property,
-        planes: Vec<Plane<D>>,
+        planes: Vec<RigidPlane<D>>,
         radius: impl Fn(usize) -> f64,
     ) -> Result<Self, Error> {
         let faces = Faces::new(bonds, surface, false);
@@ -119,7 +120,7 @@ impl<const D: usize> Planes<D> {
                     number + 1
                 )));
             }
-            each.push(Placed { plane, now: [0.0; D], before: [0.0; D], tied });
+            each.push(MovingPlane { plane, now: [0.0; D], before: [0.0; D], tied });
         }
         let mut planes = Self {
             each,
@@ -129,7 +130,7 @@ impl<const D: usize> Planes<D> {
             bonded,
             radii,
             volumes,
-            penalty: Property::new(bonds, |site, _| modulus.at(site) / spacing),
+            penalty: Property::new(bonds, |site, _| modulus.value_at(site) / spacing),
             spacing,
             pushes: Vec::new(),
             drags: Vec::new(),
@@ -144,14 +145,14 @@ impl<const D: usize> Planes<D> {
     }
 
     /// The planes.
-    pub fn planes(&self) -> impl Iterator<Item = &Plane<D>> {
+    pub fn planes(&self) -> impl Iterator<Item = &RigidPlane<D>> {
         self.each.iter().map(|placed| &placed.plane)
     }
 
     /// Moves planes to their positions at a load factor and a time, s.
-    pub fn place(&mut self, factor: f64, time: f64) {
+    pub fn move_to(&mut self, factor: f64, time: f64) {
         for placed in &mut self.each {
-            let Plane { displacement, velocity, .. } = placed.plane;
+            let RigidPlane { displacement, velocity, .. } = placed.plane;
             placed.before = placed.now;
             placed.now = std::array::from_fn(|d| factor * displacement[d] + time * velocity[d]);
         }
@@ -164,7 +165,7 @@ impl<const D: usize> Planes<D> {
 
     /// Exposes the particles among `sites` that have lost bonds: they touch planes themselves, and faces
     /// above them no longer do.
-    pub fn lose(&mut self, bonds: &dyn BodyGeometry<D>, sites: impl Iterator<Item = usize>) {
+    pub fn expose(&mut self, bonds: &dyn BodyGeometry<D>, sites: impl Iterator<Item = usize>) {
         let before = self.bare.len();
         for site in sites.filter(|&site| bonds.bonded(site) < self.bonded[site]) {
             self.bare.push(site as u32);
@@ -204,8 +205,13 @@ impl<const D: usize> Planes<D> {
     }
 
     /// Computes the state of an element beside a plane, whatever its overlap.
-    pub(super) fn beside(&self, placed: &Placed<D>, field: &Field<D>, element: usize) -> Touch<D> {
-        let Plane { normal, stiffness, .. } = placed.plane;
+    pub(super) fn beside(
+        &self,
+        placed: &MovingPlane<D>,
+        field: &Field<D>,
+        element: usize,
+    ) -> PlaneContact<D> {
+        let RigidPlane { normal, stiffness, .. } = placed.plane;
         let moved = self.displacement(field, element);
         let (home, radius, area) = match element.checked_sub(self.faces.len()) {
             None => {
@@ -220,12 +226,19 @@ impl<const D: usize> Planes<D> {
         };
         let place: [f64; D] = std::array::from_fn(|d| home[d] + moved[d] - radius * normal[d]);
         let shift: f64 = (0..D).map(|d| placed.now[d] * normal[d]).sum();
-        let stiffness = stiffness * self.penalty.at(self.head(element)) * area;
-        Touch { element, place, overlap: shift - placed.plane.height(place), offset: None, area, stiffness }
+        let stiffness = stiffness * self.penalty.value_at(self.head(element)) * area;
+        PlaneContact {
+            element,
+            place,
+            overlap: shift - placed.plane.height(place),
+            offset: None,
+            area,
+            stiffness,
+        }
     }
 
     /// Elements that a plane acts on, in order: its tied faces, or those behind it.
-    fn touches(&self, placed: &Placed<D>, field: &Field<D>) -> Vec<Touch<D>> {
+    fn touches(&self, placed: &MovingPlane<D>, field: &Field<D>) -> Vec<PlaneContact<D>> {
         if placed.plane.bonded {
             let tied = |&face: &u32| {
                 let mut element = face as usize;
@@ -244,7 +257,7 @@ impl<const D: usize> Planes<D> {
     }
 
     /// Elements nearer to a plane than `gap`, m, in order.
-    pub(super) fn near(&self, placed: &Placed<D>, field: &Field<D>, gap: f64) -> Vec<Touch<D>> {
+    pub(super) fn near(&self, placed: &MovingPlane<D>, field: &Field<D>, gap: f64) -> Vec<PlaneContact<D>> {
         let count = self.elements();
         let batch = |start: usize| {
             let range = start * BATCH..((start + 1) * BATCH).min(count);
@@ -257,7 +270,7 @@ impl<const D: usize> Planes<D> {
     }
 
     /// Computes the forces of all planes at a displacement, with friction for the motion since `start`.
-    pub fn update(&mut self, field: &Field<D>, held: &[Grip], start: Option<&Field<D>>) {
+    pub fn update(&mut self, field: &Field<D>, held: &[FrictionPair], start: Option<&Field<D>>) {
         let mut pushes = std::mem::take(&mut self.pushes);
         pushes.clear();
         let mut add = |planes: &Self, element: usize, force: [f64; D]| {
@@ -282,11 +295,11 @@ impl<const D: usize> Planes<D> {
     }
 
     /// Plane and element of a pair; `None` for two particles.
-    pub(super) fn element(&self, pair: Pair) -> Option<(usize, usize)> {
+    pub(super) fn element(&self, pair: ContactPair) -> Option<(usize, usize)> {
         match pair {
-            Pair::Particles(..) => None,
-            Pair::Face(plane, face) => Some((plane as usize, face as usize)),
-            Pair::Particle(plane, site) => {
+            ContactPair::Particles(..) => None,
+            ContactPair::Face(plane, face) => Some((plane as usize, face as usize)),
+            ContactPair::Particle(plane, site) => {
                 Some((plane as usize, self.faces.len() + self.bare.binary_search(&site).ok()?))
             }
         }
@@ -333,7 +346,7 @@ impl<const D: usize> Planes<D> {
     }
 
     /// Number of faces in contact, deepest overlap over half a spacing, and energy, J.
-    pub fn touching(&self, field: &Field<D>) -> (u64, f64, f64) {
+    pub fn summary(&self, field: &Field<D>) -> (u64, f64, f64) {
         let mut all = (0, 0.0_f64, 0.0);
         for touch in self.each.iter().flat_map(|placed| self.touches(placed, field)) {
             all.0 += 1;
@@ -344,8 +357,8 @@ impl<const D: usize> Planes<D> {
     }
 
     /// Force, area and width of the contact with each plane, without friction.
-    pub fn resting(&self, field: &Field<D>) -> Vec<PlaneReaction> {
-        let of = |placed: &Placed<D>| {
+    pub fn reactions(&self, field: &Field<D>) -> Vec<PlaneReaction> {
+        let of = |placed: &MovingPlane<D>| {
             let normal = placed.plane.normal;
             let mut resting = PlaneReaction { gap: f64::INFINITY, ..PlaneReaction::default() };
             let (mut push, mut first, mut second) = (0.0, [0.0; D], [0.0; D]);
@@ -357,7 +370,7 @@ impl<const D: usize> Planes<D> {
                 resting.area += touch.area;
                 push += along;
                 let from: [f64; D] = std::array::from_fn(|d| touch.place[d] - placed.plane.point[d]);
-                let across = super::grip::across(&normal, from);
+                let across = super::friction_pair::across(&normal, from);
                 (0..D).for_each(|d| {
                     first[d] += along * across[d];
                     second[d] += along * across[d] * across[d];
@@ -402,7 +415,7 @@ impl<const D: usize> Planes<D> {
     /// Bound of the stiffness that planes add over volumes, N/m⁴, however many faces touch.
     pub fn stiffness(&self) -> f64 {
         let mut matrix = nalgebra::Matrix3::<f64>::zeros();
-        for Placed { plane, .. } in &self.each {
+        for MovingPlane { plane, .. } in &self.each {
             let isotropic = plane.bonded || plane.friction > 0.0;
             let n = |d: usize| plane.normal.get(d).copied().unwrap_or(0.0);
             matrix += nalgebra::Matrix3::from_fn(|a, b| {

@@ -1,7 +1,7 @@
 //! Stiffness of contact: for time steps, masses of relaxation, preconditioners and their step lengths.
 
 use super::Contact;
-use super::list::{Listed, Near};
+use super::list::{ListedParticle, NearbyParticle};
 use super::planes::Planes;
 use super::ties::Ties;
 use crate::bonds::BodyGeometry;
@@ -19,16 +19,17 @@ impl<const D: usize> Contact<D> {
         let sites = displacement.sites();
         let of = |chunk: usize| {
             let pairs = self.pairs(bonds, displacement, chunk_range(chunk, sites), 0.0);
-            let stiffness =
-                |own: u32, touch: Near<D>| self.pair(own, touch.site) * bonds.volume(touch.site as usize);
+            let stiffness = |own: u32, touch: NearbyParticle<D>| {
+                self.pair(own, touch.site) * bonds.volume(touch.site as usize)
+            };
             let sums = pairs.map(|(own, touching)| touching.map(|t| stiffness(own.site, t)).sum::<f64>());
             sums.fold(0.0, f64::max)
         };
         let pairs = (0..sites.div_ceil(CHUNK)).into_par_iter().map(of).reduce(|| 0.0, f64::max);
-        pairs + self.half_of_planes()
+        pairs + self.half_plane_stiffness()
     }
 
-    fn half_of_planes(&self) -> f64 {
+    fn half_plane_stiffness(&self) -> f64 {
         let planes = self.planes.as_ref().map_or(0.0, Planes::stiffness);
         0.5 * (planes + self.ties.as_ref().map_or(0.0, Ties::greatest))
     }
@@ -36,14 +37,14 @@ impl<const D: usize> Contact<D> {
     /// Sums k V of the largest particle and half the stiffness of planes: the least value of
     /// [`Contact::greatest_stiffness`] with any contact, if all particles are alike.
     pub fn pair_stiffness(&self) -> f64 {
-        self.stiffness * self.largest_volume + self.half_of_planes()
+        self.stiffness * self.largest_volume + self.half_plane_stiffness()
     }
 
     /// Adds contacts, present or imminent, to the Gershgorin sums of dynamic relaxation, in units of
     /// `tangent`: Σ_J k V_J (1 + max_{d≠e} |n_d n_e|), and planes. A particle that became heavy only in
     /// contact would enter another as a light one and leave as a heavy one, and so on indefinitely. A
-    /// particle without bonds has twice the sum: it starts each step from rest, see [`Contact::still`], and
-    /// must not go farther than a gradient step.
+    /// particle without bonds has twice the sum: it starts each step from rest, see
+    /// [`Contact::stop_detached`], and must not go farther than a gradient step.
     pub fn add_stiffness(
         &self,
         bonds: &dyn BodyGeometry<D>,
@@ -70,7 +71,7 @@ impl<const D: usize> Contact<D> {
         tangent: f64,
         masses: &mut [f64],
     ) {
-        let of = |own: u32, Near { site, zeta, r, .. }: Near<D>| {
+        let of = |own: u32, NearbyParticle { site, zeta, r, .. }: NearbyParticle<D>| {
             let unit = zeta.map(|x| x / r.max(f64::MIN_POSITIVE));
             // friction acts in all directions
             let mixed = if self.friction > 0.0 { 1.0 } else { mixed(unit) };
@@ -83,7 +84,7 @@ impl<const D: usize> Contact<D> {
                 pairs.map(|(own, near)| (own, near.map(|near| of(own.site, near)).sum::<f64>() / tangent));
             all.filter(|(_, sum)| *sum > 0.0).collect()
         });
-        let sums: Vec<Vec<(Listed, f64)>> = sums.collect();
+        let sums: Vec<Vec<(ListedParticle, f64)>> = sums.collect();
         for (own, sum) in sums.into_iter().flatten() {
             let mass = &mut masses[own.site as usize];
             *mass = if own.alone { 2.0 * sum } else { *mass + sum };
@@ -145,7 +146,7 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Stops particles without bonds, so that they do not fly on in a search for equilibrium.
-    pub fn still(&self, velocity: &mut Field<D>) {
+    pub fn stop_detached(&self, velocity: &mut Field<D>) {
         self.list.alone.iter().for_each(|&site| velocity.set(site as usize, [0.0; D]));
     }
 }

@@ -9,7 +9,7 @@
 use super::faces::Faces;
 use crate::bonds::{BodyGeometry, LatticeBonds, Overstretched};
 use crate::field::Field;
-use crate::surface::{Face, Surface};
+use crate::surface::{BodySurface, SurfaceFace};
 
 /// Lists bonds between held particles and others, each from both ends.
 pub fn across<const D: usize>(bonds: &dyn BodyGeometry<D>, held: &[bool]) -> Vec<Overstretched> {
@@ -70,13 +70,13 @@ pub struct Ties<const D: usize> {
 
 /// Sides of free particles beside held ones, with the held particles from which to extrapolate and their
 /// factors.
-pub struct Interface<const D: usize> {
+pub struct GripInterface<const D: usize> {
     /// The sides, with normals towards the held particles.
-    pub surface: Surface<D>,
+    pub surface: BodySurface<D>,
     behind: Vec<Vec<(u32, f64)>>,
 }
 
-impl<const D: usize> Interface<D> {
+impl<const D: usize> GripInterface<D> {
     /// Finds the surface between held particles and others.
     pub fn new(bonds: &LatticeBonds<D>, held: &[bool]) -> Self {
         let (mut sides, mut behind) = (Vec::new(), Vec::new());
@@ -94,22 +94,27 @@ impl<const D: usize> Interface<D> {
                 let mut place = bonds.position(site as usize);
                 place[axis] += 0.5 * f64::from(outward) * bonds.spacing();
                 let normal = std::array::from_fn(|d| if d == axis { f64::from(outward) } else { 0.0 });
-                sides.push(Face { place, normal, patch: patch as u32 });
+                sides.push(SurfaceFace { place, normal, patch: patch as u32 });
                 behind.push(match beyond(first) {
                     Some(second) => vec![(first as u32, -1.5), (second as u32, 0.5)],
                     None => vec![(first as u32, -1.0)],
                 });
             }
         }
-        Self { surface: Surface::of_sides(sides), behind }
+        Self { surface: BodySurface::of_sides(sides), behind }
     }
 }
 
 impl<const D: usize> Ties<D> {
     /// Ties the sides of an interface to the particles behind, in a body with the outer surface `outside` and
     /// no bonds across the interface; the penalty is sM/Δx, Pa/m.
-    pub fn new(bonds: &LatticeBonds<D>, interface: Interface<D>, outside: &Surface<D>, penalty: f64) -> Self {
-        let Interface { surface, behind } = interface;
+    pub fn new(
+        bonds: &LatticeBonds<D>,
+        interface: GripInterface<D>,
+        outside: &BodySurface<D>,
+        penalty: f64,
+    ) -> Self {
+        let GripInterface { surface, behind } = interface;
         let mut faces = Faces::new(bonds, &surface.bounded_by(outside), true);
         let greatest = faces.greatest(bonds);
         let free: Vec<usize> = (0..faces.len()).map(|face| faces.below(face).count()).collect();

@@ -32,7 +32,7 @@ impl<const D: usize> Vicinity<D> {
     }
 
     /// Returns true if the list holds for a displacement; `particles` are the sites of the grid.
-    pub fn holds(&mut self, particles: &[u32], displacement: &Field<D>) -> bool {
+    pub fn is_current(&mut self, particles: &[u32], displacement: &Field<D>) -> bool {
         if self.skin == 0.0 {
             return false;
         }

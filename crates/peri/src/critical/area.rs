@@ -39,7 +39,7 @@ impl CrackArea {
     /// Cauchy and Crofton the area is Σ V_I V_J/|ξ| over these pairs, over ½ Σ_J V_J |ξ_e|/|ξ|: lines of all
     /// directions meet a surface in proportion to its area. With 1/|ξ| planes along the axes, at 45° and
     /// along (111) count the same to 2 % (cf. Boykov & Kolmogorov, ICCV 2003, doi:10.1109/ICCV.2003.1238310).
-    pub fn of<const D: usize>(&self, bonds: &dyn Bonds<D>) -> f64 {
+    pub fn area<const D: usize>(&self, bonds: &dyn Bonds<D>) -> f64 {
         let share = |site: usize, other: usize, length: f64| {
             let mut common = false;
             bonds.neighbours(site, &mut |bond| common = common || bonds.is_bonded(bond.site, other));

@@ -41,7 +41,7 @@ pub(super) const SHORT: f64 = 1.8;
 /// Distance of the bonds' centroid from a particle, over the horizon, above which the particle is at a
 /// surface: 0.33 in the outermost layer of a plane body, 0.24 to 0.28 in space, 0 inside; jitter of 0.3
 /// spacings moves it by 0.07.
-const OFF: f64 = 0.2;
+const SURFACE_OFFSET: f64 = 0.2;
 
 /// Bonds of a particle inside a body, across planes through it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,7 +62,7 @@ pub struct Crossing {
 
 /// Sums of one family.
 #[derive(Clone, Copy)]
-struct Sums<const D: usize> {
+struct FamilySums<const D: usize> {
     /// Σ w V |ξ_d||ξ|.
     reach: [f64; D],
     /// Σ w V |ξ_d|/|ξ| over short bonds.
@@ -70,10 +70,10 @@ struct Sums<const D: usize> {
     bonds: f64,
 }
 
-impl<const D: usize> Sums<D> {
+impl<const D: usize> FamilySums<D> {
     /// Sums over the family of the particle in a site; its neighbours are assumed to have its surface
     /// factors.
-    fn of(bonds: &dyn BodyGeometry<D>, surface: Option<&Field<D>>, site: usize) -> Self {
+    fn new(bonds: &dyn BodyGeometry<D>, surface: Option<&Field<D>>, site: usize) -> Self {
         let mut sums = Self { reach: [0.0; D], short: [0.0; D], bonds: 0.0 };
         let short = SHORT * bonds.spacing();
         let factors = surface.map(|field| field.get(site));
@@ -102,8 +102,8 @@ impl Crossing {
             None => inside(bonds),
         };
         let whole = !inner.is_empty();
-        let of = |sites: &[u32]| -> Vec<Sums<D>> {
-            sites.par_iter().map(|&site| Sums::of(bonds, surface, site as usize)).collect()
+        let of = |sites: &[u32]| -> Vec<FamilySums<D>> {
+            sites.par_iter().map(|&site| FamilySums::new(bonds, surface, site as usize)).collect()
         };
         let each = if whole {
             of(&inner)
@@ -115,8 +115,9 @@ impl Crossing {
                 .reduce(|a, b| if bonds.bonded(b as usize) > bonds.bonded(a as usize) { b } else { a });
             of(largest.as_slice())
         };
-        let mean =
-            |get: &dyn Fn(&Sums<D>) -> f64| each.iter().map(get).sum::<f64>() / each.len().max(1) as f64;
+        let mean = |get: &dyn Fn(&FamilySums<D>) -> f64| {
+            each.iter().map(get).sum::<f64>() / each.len().max(1) as f64
+        };
         let reaches: Vec<f64> = (0..D).map(|d| mean(&|sums| sums.reach[d])).collect();
         let axis = (0..D).fold(0, |most, d| if reaches[d] > reaches[most] { d } else { most });
         let count = mean(&|sums| sums.bonds);
@@ -138,7 +139,7 @@ fn inside<const D: usize>(bonds: &dyn BodyGeometry<D>) -> Vec<u32> {
             sum += bond.volume;
             (0..D).for_each(|d| first[d] += bond.volume * bond.bond[d]);
         });
-        first.iter().map(|x| x * x).sum::<f64>().sqrt() > OFF * bonds.horizon() * sum || sum == 0.0
+        first.iter().map(|x| x * x).sum::<f64>().sqrt() > SURFACE_OFFSET * bonds.horizon() * sum || sum == 0.0
     };
     let mut at_surface = vec![false; bonds.sites()];
     let flags: Vec<bool> = bonds.particles().par_iter().map(off).collect();

@@ -3,7 +3,7 @@
 
 use super::{Plate, kirsch};
 use crate::bonds::Bonds;
-use crate::stress::Tensor;
+use crate::stress::StressTensor;
 use rayon::prelude::*;
 
 /// Particles of a plate with a hole, with the exact σ₁₁/σ∞ at each.
@@ -23,7 +23,7 @@ pub struct HoleComparison {
 
 /// Particles over which an error is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Region {
+pub enum HoleRegion {
     /// All particles.
     All,
     /// Particles without loads and supports.
@@ -61,17 +61,17 @@ impl HoleComparison {
     }
 
     /// σ₁₁/σ∞ of a stress field under the remote stress σ∞, Pa.
-    pub fn normal<const D: usize>(field: &[Tensor<D>], remote: f64) -> Vec<f64> {
+    pub fn normal<const D: usize>(field: &[StressTensor<D>], remote: f64) -> Vec<f64> {
         field.iter().map(|s| s[0][0] / remote).collect()
     }
 
     /// Root mean square (2.84) of the difference of σ₁₁/σ∞ from an exact one over a region.
-    pub fn error(&self, normal: &[f64], exact: &[f64], region: Region) -> f64 {
+    pub fn error(&self, normal: &[f64], exact: &[f64], region: HoleRegion) -> f64 {
         let wanted = |&i: &usize| match region {
-            Region::All => true,
-            Region::Inner => self.inner[i],
-            Region::Ring => self.distance[i] <= self.near,
-            Region::Bulk => self.distance[i] > self.near && self.distance[i] < 5.0 * self.radius,
+            HoleRegion::All => true,
+            HoleRegion::Inner => self.inner[i],
+            HoleRegion::Ring => self.distance[i] <= self.near,
+            HoleRegion::Bulk => self.distance[i] > self.near && self.distance[i] < 5.0 * self.radius,
         };
         let squares = (0..normal.len()).filter(wanted).map(|i| (normal[i] - exact[i]).powi(2));
         let (sum, count) = squares.fold((0.0, 0_usize), |(sum, count), square| (sum + square, count + 1));

@@ -27,14 +27,14 @@ impl<const D: usize> Cut<D> {
 
     /// Finds the point where the segment from `a` to `b` meets the closed cut, or passes it by no more than
     /// `slack` of its length; `None` if it misses, lies along or ends on the cut.
-    fn meets(&self, a: [f64; D], b: [f64; D], slack: f64) -> Option<Meeting<D>> {
+    fn intersection(&self, a: [f64; D], b: [f64; D], slack: f64) -> Option<Intersection<D>> {
         let solution = self.passage(a, b)?;
         let size = length(std::array::from_fn::<f64, D, _>(|d| b[d] - a[d]));
         let sizes = self.edges.map(length);
         if !(NEAR..=1.0 - NEAR).contains(&solution[0]) {
             return None;
         }
-        let mut meeting = Meeting { at: solution[0], rims: Vec::new(), inward: [0.0; D] };
+        let mut meeting = Intersection { at: solution[0], rims: Vec::new(), inward: [0.0; D] };
         for edge in 0..D - 1 {
             let (place, near) = (solution[edge + 1], NEAR * size / sizes[edge]);
             let slack = slack * size / sizes[edge];
@@ -85,7 +85,7 @@ impl<const D: usize> Cut<D> {
         let reach = self.edges.iter().take(D - 1).map(|&edge| length(edge)).fold(height.abs(), f64::max);
         let [below, above] =
             [-reach, reach].map(|way| std::array::from_fn(|d| point[d] + (way - height) * normal[d]));
-        if self.meets(below, above, NEAR).is_some() { height.abs() } else { f64::INFINITY }
+        if self.intersection(below, above, NEAR).is_some() { height.abs() } else { f64::INFINITY }
     }
 
     /// Returns true if a segment of length `reach` from a point may meet the cut.
@@ -135,7 +135,7 @@ fn determinant<const D: usize>(c: &[[f64; D]; D]) -> f64 {
 }
 
 /// Intersection of a bond with a cut.
-struct Meeting<const D: usize> {
+struct Intersection<const D: usize> {
     /// Fraction of the bond's length.
     at: f64,
     /// Directions of the cut's rims there (in 2D its end: any vector); none inside.
@@ -153,7 +153,7 @@ struct Meeting<const D: usize> {
 /// on it, stays.
 pub fn severed<const D: usize>(cuts: &[Cut<D>], a: [f64; D], b: [f64; D]) -> bool {
     let (a, b) = if a <= b { (a, b) } else { (b, a) };
-    let met: Vec<Meeting<D>> = cuts.iter().filter_map(|cut| cut.meets(a, b, JOINED)).collect();
+    let met: Vec<Intersection<D>> = cuts.iter().filter_map(|cut| cut.intersection(a, b, JOINED)).collect();
     let side = |rim: &[f64; D], inward: &[f64; D]| {
         let mut columns = [*inward; D];
         columns[0] = std::array::from_fn(|d| b[d] - a[d]);

@@ -23,11 +23,11 @@ pub struct Gaps<const D: usize> {
     horizon: f64,
     /// Width of a closed gap, m.
     closed: f64,
-    kind: Kind<D>,
+    kind: GapKind<D>,
 }
 
 #[derive(Clone, Debug)]
-enum Kind<const D: usize> {
+enum GapKind<const D: usize> {
     /// Shapes, and the pairs of them that touch: row by row.
     Shapes { operations: Vec<Operation<D>>, touching: Vec<bool> },
     /// A lattice and the part of each of its cells.
@@ -50,13 +50,13 @@ impl<const D: usize> Gaps<D> {
             return None;
         }
         let touching = vec![true; operations.len().pow(2)];
-        let kind = Kind::Shapes { operations: operations.to_vec(), touching };
+        let kind = GapKind::Shapes { operations: operations.to_vec(), touching };
         let mut gaps = Self { horizon, closed, kind };
         let found: Vec<bool> = (0..operations.len().pow(2))
             .map(|pair| gaps.touch(lattice, operations, pair / operations.len(), pair % operations.len()))
             .collect();
         let parted = found.contains(&false);
-        if let Kind::Shapes { touching, .. } = &mut gaps.kind {
+        if let GapKind::Shapes { touching, .. } = &mut gaps.kind {
             *touching = found;
         }
         (narrow || parted).then_some(gaps)
@@ -68,7 +68,7 @@ impl<const D: usize> Gaps<D> {
         let parts = connected(lattice);
         let several = parts.iter().any(|&part| part > 1);
         let Lattice { spacing, origin, cells, .. } = *lattice;
-        let kind = Kind::Cells { spacing, origin, cells, parts };
+        let kind = GapKind::Cells { spacing, origin, cells, parts };
         several.then_some(Self { horizon: f64::INFINITY, closed: CLOSED * spacing, kind })
     }
 
@@ -101,13 +101,13 @@ impl<const D: usize> Gaps<D> {
         }
         let parts = points.iter().zip(parts).map(|(point, part)| (point.map(f64::to_bits), part)).collect();
         let parted = count > 1 && 10 * count as usize <= points.len();
-        parted.then_some(Self { horizon: f64::INFINITY, closed: 0.0, kind: Kind::Points { parts } })
+        parted.then_some(Self { horizon: f64::INFINITY, closed: 0.0, kind: GapKind::Points { parts } })
     }
 
     /// Selects the gaps that bonds of length `reach` from a point may meet; `None`: no gap.
-    pub fn within(&self, point: [f64; D], reach: f64) -> Option<Near<'_, D>> {
-        let Kind::Shapes { operations, touching } = &self.kind else {
-            return Some(Near { gaps: self, shapes: Vec::new() });
+    pub fn within(&self, point: [f64; D], reach: f64) -> Option<NearbyGaps<'_, D>> {
+        let GapKind::Shapes { operations, touching } = &self.kind else {
+            return Some(NearbyGaps { gaps: self, shapes: Vec::new() });
         };
         let near = |shape: &Shape<D>| {
             let (low, high) = shape.bounds();
@@ -120,7 +120,7 @@ impl<const D: usize> Gaps<D> {
             Operation::Cut(shape) => shape.width() < self.horizon,
             Operation::Add(_) => apart(index),
         });
-        gap.then_some(Near { gaps: self, shapes })
+        gap.then_some(NearbyGaps { gaps: self, shapes })
     }
 
     /// Returns true if two operations add shapes that touch after all later cuts; true for other operations.
@@ -147,7 +147,7 @@ impl<const D: usize> Gaps<D> {
                 (place(high[d].min(to[d]) + reach).ceil() as usize).min(lattice.cells[d]),
             ]
         });
-        let near = Near { gaps: self, shapes: (0..operations.len()).collect() };
+        let near = NearbyGaps { gaps: self, shapes: (0..operations.len()).collect() };
         let count: usize = range.iter().map(|[low, high]| high.saturating_sub(*low)).product();
         (0..count).any(|mut index| {
             let mut cell = [0; D];
@@ -171,26 +171,26 @@ impl<const D: usize> Gaps<D> {
 }
 
 /// The gaps near a point.
-pub struct Near<'a, const D: usize> {
+pub struct NearbyGaps<'a, const D: usize> {
     gaps: &'a Gaps<D>,
     /// Operations whose shapes are near.
     shapes: Vec<usize>,
 }
 
-impl<const D: usize> Near<'_, D> {
+impl<const D: usize> NearbyGaps<'_, D> {
     /// Returns true if the bond of `a` and `b` crosses a gap, whichever end comes first.
     pub fn severs(&self, a: [f64; D], b: [f64; D]) -> bool {
         let (a, b) = if a <= b { (a, b) } else { (b, a) };
         let (operations, touching) = match &self.gaps.kind {
-            Kind::Shapes { operations, touching } => (operations, touching),
-            Kind::Cells { spacing, origin, cells, parts } => {
+            GapKind::Shapes { operations, touching } => (operations, touching),
+            GapKind::Cells { spacing, origin, cells, parts } => {
                 let part = |point: [f64; D]| {
                     let place = |d: usize| ((point[d] - origin[d]) / spacing).round() as usize;
                     parts.get((0..D).rev().fold(0, |index, d| index * cells[d] + place(d)))
                 };
                 return part(a) != part(b);
             }
-            Kind::Points { parts } => {
+            GapKind::Points { parts } => {
                 return parts.get(&a.map(f64::to_bits)) != parts.get(&b.map(f64::to_bits));
             }
         };
@@ -227,7 +227,7 @@ impl<const D: usize> Near<'_, D> {
     /// Visits the middles of the pieces into which shapes divide the segment from `a` to `b`, except closed
     /// ones.
     fn pieces(&self, a: [f64; D], b: [f64; D], mut visit: impl FnMut([f64; D])) {
-        let Kind::Shapes { operations, .. } = &self.gaps.kind else { return };
+        let GapKind::Shapes { operations, .. } = &self.gaps.kind else { return };
         let mut ends = vec![0.0, 1.0];
         ends.extend(self.shapes.iter().filter_map(|&index| operations[index].shape().span(a, b)).flatten());
         ends.sort_by(f64::total_cmp);
@@ -247,7 +247,7 @@ impl<const D: usize> Near<'_, D> {
 
     /// Returns true if an operation adds a point that no later one removes.
     fn belongs(&self, index: usize, point: [f64; D]) -> bool {
-        let Kind::Shapes { operations, .. } = &self.gaps.kind else { return false };
+        let GapKind::Shapes { operations, .. } = &self.gaps.kind else { return false };
         let (Operation::Add(shape), later) = (&operations[index], &operations[index + 1..]) else {
             return false;
         };

@@ -1,9 +1,9 @@
 //! Rubber as the full network: a Langevin chain along every bond, and a pressure that conserves the volume.
 
-use super::crushed::{logarithm, logarithm_slopes};
+use super::compression::{logarithm, logarithm_slopes};
 use super::eight_chain::LINEAR;
 use super::point::{GRADIENT, LEAST_SHAPE};
-use super::tensor::{Tensor, cofactor, invert};
+use super::tensor::{BodyTensor, cofactor, invert};
 use super::{Bond, Family, Material};
 use crate::bonds::BodyGeometry;
 use crate::calibrate::modulus_in;
@@ -98,19 +98,19 @@ pub struct AffinePoint {
     whole: f64,
     intact: f64,
     /// M, M⁻¹ and 3 λ_min(M).
-    shape: Tensor<3>,
-    inverse: Tensor<3>,
+    shape: BodyTensor<3>,
+    inverse: BodyTensor<3>,
     least: f64,
-    gradient: Tensor<3>,
+    gradient: BodyTensor<3>,
     /// Q = P M⁻¹ without chains, Pa.
-    stress: Tensor<3>,
+    stress: BodyTensor<3>,
     /// Bound of the stiffness of `stress`, N/m⁴.
     own: f64,
 }
 
 impl Default for AffinePoint {
     fn default() -> Self {
-        let zero = Tensor::zeros();
+        let zero = BodyTensor::zeros();
         let (shape, inverse, gradient, stress) = (zero, zero, zero, zero);
         Self { whole: 0.0, intact: 0.0, shape, inverse, least: 0.0, gradient, stress, own: 0.0 }
     }
@@ -135,7 +135,7 @@ impl Material<3> for Affine {
     }
 
     fn prepare(&self, family: &Family<3>, point: &mut AffinePoint) {
-        let (mut shape, mut moment, mut intact) = (Tensor::<3>::zeros(), Tensor::<3>::zeros(), 0.0);
+        let (mut shape, mut moment, mut intact) = (BodyTensor::<3>::zeros(), BodyTensor::<3>::zeros(), 0.0);
         family.each(|bond| {
             let share = bond.volume / (bond.length * bond.length);
             let reference = nalgebra::Vector3::from(bond.reference);
@@ -151,11 +151,11 @@ impl Material<3> for Affine {
             point.intact = intact;
         }
         if !point.has_gradient() {
-            (point.gradient, point.stress) = (Tensor::zeros(), Tensor::zeros());
+            (point.gradient, point.stress) = (BodyTensor::zeros(), BodyTensor::zeros());
             return;
         }
-        point.gradient = moment / intact * point.inverse + Tensor::identity();
-        let excess = point.shape - Tensor::identity() / 3.0;
+        point.gradient = moment / intact * point.inverse + BodyTensor::identity();
+        let excess = point.shape - BodyTensor::identity() / 3.0;
         let pressure = cofactor(&point.gradient) * self.volume(point.change())[1];
         point.stress = (pressure - point.gradient * excess * self.tension(1.0)[0]) * point.inverse;
     }
@@ -166,7 +166,7 @@ impl Material<3> for Affine {
             return;
         }
         let [_, first, second] = self.volume(point.change());
-        let excess = (point.shape - Tensor::identity() / 3.0).norm() * self.tension(1.0)[0];
+        let excess = (point.shape - BodyTensor::identity() / 3.0).norm() * self.tension(1.0)[0];
         let gradient = excess
             + first.abs() * point.gradient.norm()
             + second.max(0.0) * cofactor(&point.gradient).norm_squared();
@@ -177,7 +177,7 @@ impl Material<3> for Affine {
     /// τ = [ψ′ ζ/(|ζ||ξ|) + Qξ/|ξ|²]/Σ_K V_K of both ends.
     fn force(&self, bond: &Bond<3>, own: &AffinePoint, other: &AffinePoint) -> [f64; 3] {
         let square = bond.length * bond.length;
-        let (mut along, mut stress) = (0.0, Tensor::<3>::zeros());
+        let (mut along, mut stress) = (0.0, BodyTensor::<3>::zeros());
         for end in [own, other] {
             if end.has_gradient() {
                 along += self.tension(bond.stretch())[0] / end.whole;
@@ -199,8 +199,8 @@ impl Material<3> for Affine {
             return 7.5 * self.shear * springs / point.whole;
         }
         let chains = family.sum(|bond| bond.volume * self.chain_energy(bond.stretch())) / point.whole;
-        let excess = point.shape - Tensor::identity() / 3.0;
-        let strain = point.gradient.transpose() * point.gradient - Tensor::identity();
+        let excess = point.shape - BodyTensor::identity() / 3.0;
+        let strain = point.gradient.transpose() * point.gradient - BodyTensor::identity();
         let rest = self.volume(point.change())[0] - 0.5 * self.tension(1.0)[0] * excess.dot(&strain);
         chains + point.intact / point.whole * rest
     }

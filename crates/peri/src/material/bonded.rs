@@ -1,7 +1,7 @@
 //! Bond laws as materials: no state of a particle, forces by the kernels of [`crate::bonds`].
 
-use super::softened::{Lacking, lacking_energy};
-use super::{Bond, Family, LawCover, LawRange, Material, Response};
+use super::softened::{SofteningLoss, lacking_energy};
+use super::{Bond, Family, LawCover, LawRange, Material, SolverMaterial};
 use crate::bonds::{BodyGeometry, Bonds, Overstretched, Property};
 use crate::error::Error;
 use crate::field::{CHUNK, Field};
@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 /// Ratio of the largest tangent to that at rest above which every particle has the stiffness of its own
 /// bonds.
-const MUCH: f64 = 1.2;
+const STIFFENED: f64 = 1.2;
 /// Least tangent of a bond in its particles' stiffness, over that at rest.
 const LEAST_TANGENT: f64 = 0.25;
 /// Samples of a law over a range of stretches.
@@ -92,11 +92,11 @@ impl<const D: usize> Material<D> for BondMaterial<'_> {
         self.modulus * self.law.tangent() / 3.0
     }
 
-    fn respond<'a>(self, _bonds: &dyn Bonds<D>) -> Box<dyn Response<D> + 'a>
+    fn respond<'a>(self, _bonds: &dyn Bonds<D>) -> Box<dyn SolverMaterial<D> + 'a>
     where
         Self: 'a,
     {
-        let lacking = Lacking::default();
+        let lacking = SofteningLoss::default();
         Box::new(Kernels { material: self, fitted: None, table: None, tangents: None, fit: None, lacking })
     }
 }
@@ -120,10 +120,10 @@ struct Kernels<'a> {
     /// The fit, if bonds soften.
     fit: Option<KernelFit>,
     /// Forces that softened bonds of the present displacement have lost.
-    lacking: Lacking,
+    lacking: SofteningLoss,
 }
 
-impl<const D: usize> Response<D> for Kernels<'_> {
+impl<const D: usize> SolverMaterial<D> for Kernels<'_> {
     fn bond_law(&self) -> (&dyn BondPotential, f64) {
         (&*self.material.law, self.material.modulus)
     }
@@ -149,7 +149,7 @@ impl<const D: usize> Response<D> for Kernels<'_> {
 
     fn prepare(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>) {
         if let Some((end, fit)) = self.material.end.as_ref().zip(self.fit.as_ref()) {
-            self.lacking = Lacking::new(&self.material, end, fit, bonds, displacement);
+            self.lacking = SofteningLoss::new(&self.material, end, fit, bonds, displacement);
         }
     }
 
@@ -235,7 +235,7 @@ impl<const D: usize> Response<D> for Kernels<'_> {
     }
 
     fn has_own_stiffness(&self, tangent: f64) -> bool {
-        tangent > MUCH * self.material.modulus * self.material.law.tangent().abs()
+        tangent > STIFFENED * self.material.modulus * self.material.law.tangent().abs()
     }
 
     /// Σ_J (2 w V_J/|ξ|)·max(|t′|, |t|/λ)(1 + max_{d≠e} |n_d n_e|) with the directions of the deformed bonds.

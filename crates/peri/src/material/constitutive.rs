@@ -1,7 +1,7 @@
 //! Any constitutive law C → (W, S, ℂ) as the law of a family's mean deformation.
 
 use super::point_law::{Deformation, PointLaw, PointStress};
-use super::tensor::{Tensor, embed};
+use super::tensor::{BodyTensor, embed};
 use crate::calibrate::Space;
 use crate::error::Error;
 use nalgebra::Matrix3;
@@ -96,7 +96,7 @@ impl<L: Law, const D: usize> Correspondence<L, D> {
     }
 
     /// Computes λ₃² and the law's prediction at C, with ℂ if requested.
-    fn predict(&self, gradient: &Tensor<D>, tangent: bool) -> Option<(f64, Prediction)> {
+    fn predict(&self, gradient: &BodyTensor<D>, tangent: bool) -> Option<(f64, Prediction)> {
         let mut c = voigt::from_stress(&embed(&(gradient.transpose() * gradient), 1.0));
         MEMORY.with_borrow_mut(|memory| {
             if self.space == Space::PlaneStress {
@@ -135,7 +135,7 @@ impl<L: Law, const D: usize> PointLaw<D> for Correspondence<L, D> {
     fn respond(&self, deformation: &Deformation<D>) -> PointStress<D> {
         let found = self.upright(deformation);
         let stress = found.map_or(Matrix3::from_element(f64::NAN), |found| voigt::to_stress(&found.stress));
-        let plane = Tensor::<D>::from_fn(|a, b| stress[(a, b)]);
+        let plane = BodyTensor::<D>::from_fn(|a, b| stress[(a, b)]);
         PointStress { piola: deformation.gradient() * plane, stabilisation: self.stabilisation * self.shear }
     }
 

@@ -1,6 +1,6 @@
 //! Rubber as a network of Langevin chains with a pressure that conserves the volume.
 
-use super::crushed::{CRUSHED, inverse_square, logarithm, logarithm_slopes};
+use super::compression::{CRUSH_LIMIT, inverse_square, logarithm, logarithm_slopes};
 use super::point_law::{Deformation, PointLaw, PointStress};
 use super::tensor::cofactor;
 use crate::calibrate::Space;
@@ -15,7 +15,7 @@ use polycore::langevin;
 /// I₁ = S in three dimensions, S + 1 in plane strain, and S + λ₃² in plane stress, where the stretch λ₃ of
 /// the thickness follows from W; incompressible sheets have λ₃ = 1/J.
 #[derive(Clone, Copy, Debug)]
-pub struct EightChain<const D: usize> {
+pub struct EightChainSolid<const D: usize> {
     space: Space,
     modulus: f64,
     links: f64,
@@ -33,7 +33,7 @@ pub(super) const LINEAR: f64 = 0.995;
 /// Excess of I₁ below which the energy is integrated from μ, without cancellation.
 const SMALL: f64 = 0.05;
 
-impl<const D: usize> EightChain<D> {
+impl<const D: usize> EightChainSolid<D> {
     /// Creates the law of a shear modulus μ₀ > 0 in Pa and n > 1 links a chain. The bulk modulus K in Pa is
     /// above 2μ₀/3 + 2 dμ/dI₁ at rest, or infinite in plane stress.
     ///
@@ -139,7 +139,7 @@ impl<const D: usize> EightChain<D> {
             let square = inverse_square(jacobian);
             // J⁻² − 1 with all digits
             let third =
-                if jacobian > CRUSHED { -change * (2.0 + change) * square[0] } else { square[0] - 1.0 };
+                if jacobian > CRUSH_LIMIT { -change * (2.0 + change) * square[0] } else { square[0] - 1.0 };
             return Thickness { third, change: 0.0, square };
         }
         // ∂W/∂λ₃ = μλ₃ + U′(Jλ₃) J = 0
@@ -218,7 +218,7 @@ struct Thickness {
     square: [f64; 3],
 }
 
-impl<const D: usize> PointLaw<D> for EightChain<D> {
+impl<const D: usize> PointLaw<D> for EightChainSolid<D> {
     fn energy(&self, deformation: &Deformation<D>) -> f64 {
         let (excess, change) = (deformation.excess_trace(), deformation.volume_change());
         if self.space != Space::PlaneStress {

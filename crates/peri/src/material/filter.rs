@@ -1,7 +1,7 @@
 //! Average of pressures over nearest neighbours: at a bulk modulus of a thousand shear moduli the pressures
 //! of single particles are rough at corners of grips.
 
-use super::point::Point;
+use super::point::SolidPoint;
 use super::point_law::PointLaw;
 use crate::bonds::BodyGeometry;
 use rayon::prelude::*;
@@ -23,7 +23,7 @@ impl Filter {
     pub(super) fn link<const D: usize>(
         &mut self,
         bonds: &dyn BodyGeometry<D>,
-        points: &[Point<D>],
+        points: &[SolidPoint<D>],
         spacing: f64,
     ) {
         let of = |site: usize| {
@@ -46,8 +46,8 @@ impl Filter {
 
     /// Changes the energy to Σ_I V_I I_I U((bJ)_I): with p_I = Σ_J b_IJ I_J U′((bJ)_J)/I_I in place of
     /// U′(J_I), forces are its exact variation.
-    pub(super) fn apply<L: PointLaw<D>, const D: usize>(&mut self, law: &L, points: &mut [Point<D>]) {
-        let change = |point: &Point<D>| point.deformation().map_or(0.0, |found| found.volume_change());
+    pub(super) fn apply<L: PointLaw<D>, const D: usize>(&mut self, law: &L, points: &mut [SolidPoint<D>]) {
+        let change = |point: &SolidPoint<D>| point.deformation().map_or(0.0, |found| found.volume_change());
         points.par_iter().map(change).collect_into_vec(&mut self.values);
         self.average::<D>();
         let own = |change: f64| law.filtered(change).unwrap_or_default();

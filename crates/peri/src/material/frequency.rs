@@ -12,9 +12,9 @@
 //! greatest of Σ_j ω(1 − cos k·ξ) over Σ_j ω, both measured. Shape tensors enter by R_i: a family of few
 //! bonds is stiff, and its neighbours share that stiffness.
 
-use super::point::{Point, Reach};
+use super::point::{FrequencyTerms, SolidPoint};
 use super::point_law::PointLaw;
-use super::{Body, Family};
+use super::{DeformedBody, Family};
 use crate::field::{CHUNK, chunk_range};
 use nalgebra::SVector;
 use rayon::prelude::*;
@@ -31,7 +31,7 @@ fn greatest_wave<const D: usize>() -> f64 {
     if D == 2 { 2.6 } else { 2.4 }
 }
 
-impl<const D: usize> Point<D> {
+impl<const D: usize> SolidPoint<D> {
     /// Computes R, b and Σ V/|ξ|² of the intact bonds.
     fn measure(&mut self, family: &Family<D>) {
         let (mut size, mut sum, mut squares) = (0.0, SVector::<f64, D>::zeros(), 0.0);
@@ -60,7 +60,7 @@ impl<const D: usize> Point<D> {
         if self.reach.size.is_nan() {
             self.measure(family);
         }
-        let Reach { size, among, squares, .. } = self.reach;
+        let FrequencyTerms { size, among, squares, .. } = self.reach;
         if !self.has_gradient() {
             (self.reach.front, self.reach.slope) = (0.0, 0.0);
             return 4.0 * self.spring * squares;
@@ -78,7 +78,7 @@ impl<const D: usize> Point<D> {
 }
 
 /// Computes m_j of a particle.
-fn of_particle<const D: usize>(family: &Family<D>, points: &[Point<D>]) -> f64 {
+fn of_particle<const D: usize>(family: &Family<D>, points: &[SolidPoint<D>]) -> f64 {
     let own = &points[family.site()];
     let mut sum = own.reach.front * own.reach.own;
     family.each(|bond| {
@@ -97,12 +97,12 @@ fn of_particle<const D: usize>(family: &Family<D>, points: &[Point<D>]) -> f64 {
 /// Computes max m_j, or returns `enough` if that is larger.
 pub fn bound<const D: usize>(
     law: &(impl PointLaw<D> + ?Sized),
-    (bonds, displacement): Body<D>,
-    points: &mut [Point<D>],
+    (bonds, displacement): DeformedBody<D>,
+    points: &mut [SolidPoint<D>],
     enough: f64,
 ) -> f64 {
     let particles = bonds.particles();
-    let of_chunk = |(chunk, points): (usize, &mut [Point<D>])| {
+    let of_chunk = |(chunk, points): (usize, &mut [SolidPoint<D>])| {
         let range = chunk_range(chunk, bonds.sites());
         let [from, to] =
             [range.start, range.end].map(|end| particles.partition_point(|&s| (s as usize) < end));

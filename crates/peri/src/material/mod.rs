@@ -6,19 +6,18 @@
 //! the states of both ends. Bond laws need no state: their `Point` is `()`, they have no first pass, and the
 //! second runs in the vectorised kernels of [`crate::bonds`].
 //!
-//! Solvers use a material through [`Response`], which [`Material::respond`] makes of it: forces by work
+//! Solvers use a material through [`SolverMaterial`], which [`Material::respond`] makes of it: forces by work
 //! items, the energy, bounds of the stiffness. A plain material need not implement it.
 
 mod affine;
 mod bonded;
 mod cloud_passes;
+mod compression;
 mod constitutive;
-mod crushed;
 mod eight_chain;
 mod family;
 mod filter;
 mod frequency;
-mod levels;
 mod nonlocal_solid;
 mod point;
 mod point_law;
@@ -28,6 +27,7 @@ mod relief;
 mod response;
 mod softened;
 mod solid_passes;
+mod spline_levels;
 mod strength;
 mod tensor;
 mod traction;
@@ -35,16 +35,16 @@ mod traction;
 pub use affine::{Affine, AffinePoint};
 pub use bonded::BondMaterial;
 pub use constitutive::Correspondence;
-pub use eight_chain::EightChain;
+pub use eight_chain::EightChainSolid;
 pub use family::{Bond, Family};
-pub use point::Point;
+pub use point::SolidPoint;
 pub use point_law::{Deformation, NonlocalSolid, PointLaw, PointStress};
 pub use pointwise::{Passes, Pointwise};
 pub use prestrained::Prestrained;
 pub use relief::relief;
-pub use response::{LawCover, LawRange, Response};
+pub use response::{LawCover, LawRange, SolverMaterial};
 pub use strength::energy_at_strength;
-pub use tensor::Tensor;
+pub use tensor::BodyTensor;
 pub use traction::surface_load;
 
 pub use crate::bonds::Property;
@@ -54,7 +54,7 @@ use crate::calibrate::{Space, modulus_in, stiffness_1111};
 use crate::field::Field;
 
 /// A body in a state: its bonds and displacement.
-pub type Body<'a, const D: usize> = (&'a dyn BodyGeometry<D>, &'a Field<D>);
+pub type DeformedBody<'a, const D: usize> = (&'a dyn BodyGeometry<D>, &'a Field<D>);
 
 /// A material: the forces between particles follow from an energy E = Σ_I V_I W_I.
 ///
@@ -115,7 +115,7 @@ pub trait Material<const D: usize>: Send + Sync {
     /// every few steps; it should be cheaper and sharper than twice the greatest [`Self::stiffness`], which
     /// is used if this returns `None`. A result below `enough` may be replaced by `enough`. `points` are the
     /// states of all sites.
-    fn frequency_bound(&self, body: Body<D>, points: &mut [Self::Point], enough: f64) -> Option<f64> {
+    fn frequency_bound(&self, body: DeformedBody<D>, points: &mut [Self::Point], enough: f64) -> Option<f64> {
         let _ = (body, points, enough);
         None
     }
@@ -164,7 +164,7 @@ pub trait Material<const D: usize>: Send + Sync {
     }
 
     /// Makes the material ready for solvers. The default loops over bonds with [`Self::force`].
-    fn respond<'a>(self, bonds: &dyn Bonds<D>) -> Box<dyn Response<D> + 'a>
+    fn respond<'a>(self, bonds: &dyn Bonds<D>) -> Box<dyn SolverMaterial<D> + 'a>
     where
         Self: Sized + 'a,
     {

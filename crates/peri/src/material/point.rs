@@ -2,8 +2,8 @@
 
 use super::family::{Bond, Family};
 use super::point_law::{Deformation, PointLaw, PointStress};
-use super::tensor::{Tensor, cofactor, invert};
-use crate::bonds::Columns;
+use super::tensor::{BodyTensor, cofactor, invert};
+use crate::bonds::MomentColumns;
 use nalgebra::SVector;
 
 /// D λ_min(M) below which a family has no deformation gradient. Intact corners have at least 0.50.
@@ -15,12 +15,12 @@ pub(super) const GRADIENT: f64 = 3.1;
 
 /// State of a particle's family.
 #[derive(Clone, Debug)]
-pub struct Point<const D: usize> {
+pub struct SolidPoint<const D: usize> {
     /// Σ_J V_J of the whole family, m³, and of the intact bonds of `inverse` and `shape`.
     pub(super) whole: f64,
     pub(super) intact: f64,
     /// M⁻¹.
-    pub(super) inverse: Tensor<D>,
+    pub(super) inverse: BodyTensor<D>,
     /// D λ_min(M).
     pub(super) shape: f64,
     pub(super) deformation: Deformation<D>,
@@ -28,30 +28,30 @@ pub struct Point<const D: usize> {
     pub(super) filtered: [f64; 2],
     /// A and Q + A 1, both over Σ_J V_J, and the stiffness of the springs over Σ_J V_J, Pa/m³.
     pub(super) slope: f64,
-    pub(super) stress: Tensor<D>,
+    pub(super) stress: BodyTensor<D>,
     pub(super) spring: f64,
     /// Share of the particle in the bound of the stiffness, N/m⁴.
     pub(super) own: f64,
     /// Terms of the frequency bound, see [`super::frequency`].
-    pub(super) reach: Reach,
+    pub(super) reach: FrequencyTerms,
     /// Correction by θ, if bonds have one.
-    pub(super) relief: Option<Box<Relieved<D>>>,
+    pub(super) relief: Option<Box<ReliefTerms<D>>>,
 }
 
 /// Correction of a particle by θ.
 #[derive(Clone, Debug)]
-pub(super) struct Relieved<const D: usize> {
+pub(super) struct ReliefTerms<const D: usize> {
     /// G = Σ_J ω (θ_J − θ_I)⊗ξ M⁻¹/I.
-    pub(super) gradient: Tensor<D>,
+    pub(super) gradient: BodyTensor<D>,
     /// Σ_J ω ζ⊗z(θ)/I, a part of the displacement gradient.
-    pub(super) part: Tensor<D>,
+    pub(super) part: BodyTensor<D>,
     /// P over Σ_J V_J, Pa/m³.
-    pub(super) piola: Tensor<D>,
+    pub(super) piola: BodyTensor<D>,
 }
 
-impl<const D: usize> Default for Point<D> {
+impl<const D: usize> Default for SolidPoint<D> {
     fn default() -> Self {
-        let zero = Tensor::zeros();
+        let zero = BodyTensor::zeros();
         Self {
             whole: 0.0,
             intact: 0.0,
@@ -63,23 +63,23 @@ impl<const D: usize> Default for Point<D> {
             stress: zero,
             spring: 0.0,
             own: 0.0,
-            reach: Reach::default(),
+            reach: FrequencyTerms::default(),
             relief: None,
         }
     }
 }
 
-impl<const D: usize> Point<D> {
+impl<const D: usize> SolidPoint<D> {
     /// Computes Σ_J V_J, M⁻¹ and D λ_min(M) of the intact bonds.
     pub(super) fn reshape(&mut self, family: &Family<D>) {
-        let (mut shape, mut shifted, mut intact) = (Tensor::<D>::zeros(), Tensor::<D>::zeros(), 0.0);
+        let (mut shape, mut shifted, mut intact) = (BodyTensor::<D>::zeros(), BodyTensor::<D>::zeros(), 0.0);
         let relieved = self.relief.is_some();
         family.each(|bond| {
             let share = bond.volume / (bond.length * bond.length);
             intact += bond.volume;
-            shape += Tensor::from_fn(|a, b| share * bond.reference[a] * bond.reference[b]);
+            shape += BodyTensor::from_fn(|a, b| share * bond.reference[a] * bond.reference[b]);
             if relieved {
-                shifted += Tensor::from_fn(|a, b| share * bond.relief[a] * bond.reference[b]);
+                shifted += BodyTensor::from_fn(|a, b| share * bond.relief[a] * bond.reference[b]);
             }
         });
         self.intact = intact;
@@ -103,7 +103,7 @@ impl<const D: usize> Point<D> {
     }
 
     /// Writes the same terms for the cloud kernels; for a particle with θ, also P/Σ_K V_K.
-    pub(super) fn fill(&self, terms: &mut [Columns<D>]) {
+    pub(super) fn fill(&self, terms: &mut [MomentColumns<D>]) {
         let tensors = std::iter::once(&self.stress).chain(self.relief.as_ref().map(|relief| &relief.piola));
         for (columns, tensor) in terms.iter_mut().zip(tensors) {
             (0..D).for_each(|b| (0..D).for_each(|a| columns[b][a] = tensor[(a, b)]));
@@ -147,7 +147,7 @@ impl<const D: usize> Point<D> {
 
     /// Sets the deformation from Σ_J (V_J/|ξ|²) η⊗ξ, Σ_J (V_J/|ξ|²) η⊗(θ_J − θ_I) and Σ_J (V_J/|ξ|²)|η|² over
     /// the intact bonds.
-    pub(super) fn deform(&mut self, moment: Tensor<D>, shifted: Tensor<D>, square: f64) {
+    pub(super) fn deform(&mut self, moment: BodyTensor<D>, shifted: BodyTensor<D>, square: f64) {
         let (dimension, moment) = (D as f64, moment / self.intact);
         let gradient = moment * self.inverse;
         let residual = dimension * (square / self.intact - gradient.dot(&moment));
@@ -163,7 +163,7 @@ impl<const D: usize> Point<D> {
     /// Evaluates a law at the deformation.
     pub(super) fn answer(&mut self, law: &(impl PointLaw<D> + ?Sized)) {
         let found = self.respond(law);
-        let relieved = self.relief.as_ref().map_or_else(Tensor::zeros, |relief| relief.part);
+        let relieved = self.relief.as_ref().map_or_else(BodyTensor::zeros, |relief| relief.part);
         let gradient = self.deformation.displacement_gradient - relieved;
         self.slope = D as f64 * found.stabilisation / self.whole;
         self.stress = found.piola * self.inverse / self.whole - gradient * self.slope;
@@ -178,9 +178,9 @@ impl<const D: usize> Point<D> {
     pub(super) fn spring(&mut self, law: &(impl PointLaw<D> + ?Sized)) {
         let dimension = D as f64;
         let stiffness = dimension * (dimension + 2.0) * law.shear_modulus();
-        (self.slope, self.stress) = (0.0, Tensor::zeros());
+        (self.slope, self.stress) = (0.0, BodyTensor::zeros());
         if let Some(relief) = &mut self.relief {
-            relief.piola = Tensor::zeros();
+            relief.piola = BodyTensor::zeros();
         }
         if self.whole > 0.0 {
             self.spring = stiffness / self.whole;
@@ -214,7 +214,7 @@ impl<const D: usize> Point<D> {
 
 /// Terms of a particle in the frequency bound, see [`super::frequency`].
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Reach {
+pub(super) struct FrequencyTerms {
     /// R and b, 1/m, and Σ_J V_J/|ξ|² of the intact bonds, m; NaN until computed.
     pub(super) size: f64,
     pub(super) own: f64,
@@ -226,13 +226,13 @@ pub(super) struct Reach {
     pub(super) slope: f64,
 }
 
-impl Default for Reach {
+impl Default for FrequencyTerms {
     fn default() -> Self {
         Self { size: f64::NAN, own: f64::NAN, squares: f64::NAN, among: f64::NAN, front: 0.0, slope: 0.0 }
     }
 }
 
-impl Reach {
+impl FrequencyTerms {
     /// Marks the terms as outdated after bonds have changed.
     pub fn forget(&mut self) {
         self.size = f64::NAN;

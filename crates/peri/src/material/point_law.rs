@@ -1,6 +1,6 @@
 //! Laws of the mean deformation of a family.
 
-use super::tensor::{Tensor, embed};
+use super::tensor::{BodyTensor, embed};
 use polycore::constitutive::Flags;
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use std::sync::Arc;
 #[derive(Clone, Copy, Debug)]
 pub struct Deformation<const D: usize> {
     /// H = F − 1 = (Σ_J ω η⊗ξ/I) M⁻¹, on clouds plus the part of [`super::relief`].
-    pub displacement_gradient: Tensor<D>,
+    pub displacement_gradient: BodyTensor<D>,
     /// D Σ_J ω|ζ − Fξ|²/I, F without that part: the part of the deformation that no gradient describes. 0 for
     /// a homogeneous deformation.
     pub residual: f64,
@@ -17,8 +17,8 @@ pub struct Deformation<const D: usize> {
 
 impl<const D: usize> Deformation<D> {
     /// F.
-    pub fn gradient(&self) -> Tensor<D> {
-        self.displacement_gradient + Tensor::identity()
+    pub fn gradient(&self) -> BodyTensor<D> {
+        self.displacement_gradient + BodyTensor::identity()
     }
 
     /// J − 1 = det F − 1, exact to all digits at small strains.
@@ -41,7 +41,7 @@ impl<const D: usize> Deformation<D> {
 #[derive(Clone, Copy, Debug)]
 pub struct PointStress<const D: usize> {
     /// P = ∂W/∂F at a constant residual, Pa.
-    pub piola: Tensor<D>,
+    pub piola: BodyTensor<D>,
     /// 2 ∂W/∂(residual), Pa: the shear modulus of the stabilisation.
     pub stabilisation: f64,
 }

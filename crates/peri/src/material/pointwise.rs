@@ -1,6 +1,6 @@
 //! Materials by plain loops over families: any [`Material`] with the states of all particles.
 
-use super::{Bond, Family, LawCover, LawRange, Material, Response};
+use super::{Bond, Family, LawCover, LawRange, Material, SolverMaterial};
 use crate::bonds::{Bonds, Overstretched, Property, StretchScan, overstretched};
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
@@ -21,7 +21,7 @@ pub trait Passes<M: Material<D> + ?Sized, const D: usize>: Send + Sync {
         points: &mut [M::Point],
     );
 
-    /// Runs the second pass over a work item; see [`Response::force`].
+    /// Runs the second pass over a work item; see [`SolverMaterial::force`].
     #[expect(clippy::too_many_arguments, reason = "those of the response, and what it has")]
     fn force(
         &self,
@@ -82,7 +82,7 @@ impl<M: Material<D>, const D: usize> Pointwise<M, D> {
     }
 
     /// Visits the force densities τ_IJ − τ_JI, N/m⁶, of the intact bonds of a particle, after
-    /// [`Response::prepare`].
+    /// [`SolverMaterial::prepare`].
     pub fn bond_forces(
         &self,
         bonds: &dyn Bonds<D>,
@@ -109,7 +109,7 @@ fn particles_of<const D: usize>(bonds: &dyn Bonds<D>, chunk: usize) -> &[u32] {
     &particles[place(range.start)..place(range.end)]
 }
 
-impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
+impl<M: Material<D>, const D: usize> SolverMaterial<D> for Pointwise<M, D> {
     fn bond_law(&self) -> (&dyn BondPotential, f64) {
         (&LinearBond, self.modulus)
     }

@@ -7,10 +7,10 @@
 //! 0: symmetric and positive definite as soon as some particles have θ = 0. Cf. Chen, Hillman & Rüter 2013,
 //! doi:10.1002/nme.4512.
 
-use super::levels::Levels;
 use super::point::LEAST_SHAPE;
+use super::spline_levels::SplineLevels;
 use super::tensor::{Vector, invert};
-use crate::bonds::{BodyGeometry, Bonds, CloudBonds, CloudPlaces, Columns, Kind};
+use crate::bonds::{BodyGeometry, BondKind, Bonds, CloudBonds, CloudPlaces, MomentColumns};
 use crate::field::{CHUNK, Field};
 use nalgebra::SMatrix;
 use polycore::numerics::{conjugate_gradients, ordered_sum};
@@ -30,9 +30,9 @@ const NEAR: f64 = 2.0;
 /// need none. Call it before any bond breaks: θ then stays constant, and the remaining bonds keep their part
 /// of the correction, so that forces follow from an energy however many break.
 pub fn relief<const D: usize>(bonds: &dyn Bonds<D>) -> Option<Field<D>> {
-    let Kind::Cloud(cloud) = bonds.kind() else { return None };
+    let BondKind::Cloud(cloud) = bonds.kind() else { return None };
     let inside = complete(cloud);
-    inside.contains(&true).then(|| Problem::new(cloud, inside).solve())
+    inside.contains(&true).then(|| ReliefProblem::new(cloud, inside).solve())
 }
 
 /// Marks the families inside the body: no bond leads to a surface particle nearer than δ − ½Δx (its half cell
@@ -80,17 +80,17 @@ fn directions<const D: usize>() -> Vec<[f64; D]> {
     (0..count).map(place).collect()
 }
 
-struct Problem<'a, const D: usize> {
+struct ReliefProblem<'a, const D: usize> {
     cloud: &'a CloudBonds<D>,
     places: CloudPlaces<D>,
-    terms: Vec<Columns<D>>,
+    terms: Vec<MomentColumns<D>>,
     force: Field<D>,
     inside: Vec<bool>,
     /// Σ_J V_J and M⁻¹ of each family; 0 if it does not span space.
     families: Vec<(f64, SMatrix<f64, D, D>)>,
 }
 
-impl<'a, const D: usize> Problem<'a, D> {
+impl<'a, const D: usize> ReliefProblem<'a, D> {
     fn new(cloud: &'a CloudBonds<D>, mut inside: Vec<bool>) -> Self {
         let family = |site: usize| {
             let (mut shape, mut whole) = (SMatrix::<f64, D, D>::zeros(), 0.0);
@@ -119,7 +119,7 @@ impl<'a, const D: usize> Problem<'a, D> {
         // Lθ is about ¼m ∫(Δθ)², m = Σωξ₁⁴, for smooth fields
         let fourth = if D == 2 { 3.0 / 16.0 } else { 3.0 / 25.0 } * self.cloud.horizon().powi(2);
         let cloud = self.cloud;
-        let mut levels = Levels::new(cloud, &self.inside, 0.25 * fourth);
+        let mut levels = SplineLevels::new(cloud, &self.inside, 0.25 * fourth);
         let precondition = |residual: &[Vector<D>], scaled: &mut [Vector<D>]| {
             let each = scaled.par_iter_mut().zip(residual).zip(&scale);
             each.for_each(|((scaled, r), scale)| *scaled = r / *scale);

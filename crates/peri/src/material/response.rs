@@ -14,7 +14,7 @@ pub struct LawCover {
     pub bound: f64,
     /// True if the law stays constant beyond the ends, as it must if bonds break.
     pub clamped: bool,
-    /// Result of [`Response::cover`] for these stretches in a resumed run.
+    /// Result of [`SolverMaterial::cover`] for these stretches in a resumed run.
     pub known: Option<f64>,
 }
 
@@ -30,7 +30,7 @@ pub struct LawRange {
 }
 
 /// A material as solvers use it. Forces are computed by work items, so that a trait object costs nothing.
-pub trait Response<const D: usize>: Send + Sync {
+pub trait SolverMaterial<const D: usize>: Send + Sync {
     /// A bond law and its kθ, N/m⁶, of similar stiffness; the material's own for bond laws.
     fn bond_law(&self) -> (&dyn BondPotential, f64);
 
@@ -68,7 +68,7 @@ pub trait Response<const D: usize>: Send + Sync {
         track: Option<&mut StretchRange>,
     );
 
-    /// Granularity of [`Response::force`] in sites, see [`crate::bonds::BondForces::piece`].
+    /// Granularity of [`SolverMaterial::force`] in sites, see [`crate::bonds::BondForces::piece`].
     fn piece(&self, bonds: &dyn Bonds<D>) -> usize {
         let _ = bonds;
         CHUNK

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 /// Softened bonds of a displacement, by work items: site, and the force density lost by its bonds, N/m³ (to
 /// be added).
 #[derive(Default)]
-pub(super) struct Lacking(Vec<Vec<(u32, [f64; 3])>>);
+pub(super) struct SofteningLoss(Vec<Vec<(u32, [f64; 3])>>);
 
 /// Visits the bonds beyond the onset that a work item finds, with their stretch and λ_f; all items together
 /// find each bond from both ends.
@@ -30,7 +30,7 @@ fn each<const D: usize>(
     }
 }
 
-impl Lacking {
+impl SofteningLoss {
     /// Collects the losses of a displacement, with the fit of the kernels.
     pub fn new<const D: usize>(
         material: &BondMaterial,

@@ -1,12 +1,12 @@
 //! The two passes of a solid on a lattice, by the kernels of [`crate::bonds`], and parts shared with clouds.
 
-use super::Body;
+use super::DeformedBody;
 use super::family::Family;
 use super::filter::Filter;
-use super::point::Point;
+use super::point::SolidPoint;
 use super::point_law::{NonlocalSolid, PointLaw};
 use super::pointwise::Passes;
-use super::tensor::Tensor;
+use super::tensor::BodyTensor;
 use crate::bonds::{BodyGeometry, BondDamage, Bonds, LinearRow, Softened, StretchRange, among};
 use crate::field::{CHUNK, Field, chunk_range};
 use rayon::prelude::*;
@@ -37,16 +37,21 @@ impl Families {
     }
 
     /// Detects changes since the last pass.
-    pub(super) fn changes<const D: usize>(&mut self, bonds: &dyn Bonds<D>) -> Changes {
+    pub(super) fn changes<const D: usize>(&mut self, bonds: &dyn Bonds<D>) -> FamilyChanges {
         let revision = bonds.softening().revision();
         let softer = self.revision != revision;
         let any = softer || self.known != Some(bonds.directed_bonds());
         (self.known, self.revision) = (Some(bonds.directed_bonds()), revision);
-        Changes { any, softer }
+        FamilyChanges { any, softer }
     }
 
     /// Finds the particles with springs and their neighbours, if there are `springs`.
-    pub(super) fn mark<const D: usize>(&mut self, bonds: &dyn Bonds<D>, points: &[Point<D>], springs: bool) {
+    pub(super) fn mark<const D: usize>(
+        &mut self,
+        bonds: &dyn Bonds<D>,
+        points: &[SolidPoint<D>],
+        springs: bool,
+    ) {
         self.sprung.clear();
         if springs {
             self.sprung.resize(bonds.sites(), false);
@@ -64,7 +69,7 @@ impl Families {
         &self,
         bonds: &dyn Bonds<D>,
         displacement: &Field<D>,
-        points: &[Point<D>],
+        points: &[SolidPoint<D>],
         first: usize,
         force: &mut [&mut [f64]; D],
     ) {
@@ -82,21 +87,21 @@ impl Families {
 
 /// Changes of bonds, and of the softened ones among them, since the last pass.
 #[derive(Clone, Copy)]
-pub(super) struct Changes {
+pub(super) struct FamilyChanges {
     any: bool,
     softer: bool,
 }
 
-impl Changes {
+impl FamilyChanges {
     /// Reshapes the particles from the site `first` on whose bonds have changed; `soft` are their softened
     /// bonds.
     pub(super) fn reshape<const D: usize>(
         self,
         law: &impl PointLaw<D>,
-        (bonds, displacement): Body<D>,
+        (bonds, displacement): DeformedBody<D>,
         (first, soft): (usize, &[Softened]),
         bonded: &mut [u32],
-        points: &mut [Point<D>],
+        points: &mut [SolidPoint<D>],
     ) {
         if !self.any {
             return;
@@ -142,7 +147,7 @@ impl<L: PointLaw<D>, const D: usize, const N: usize> Passes<NonlocalSolid<L>, D>
         solid: &NonlocalSolid<L>,
         bonds: &dyn Bonds<D>,
         displacement: &Field<D>,
-        points: &mut [Point<D>],
+        points: &mut [SolidPoint<D>],
     ) {
         let Some(lattice) = bonds.as_lattice() else { return };
         let softening = lattice.softening();
@@ -161,15 +166,15 @@ impl<L: PointLaw<D>, const D: usize, const N: usize> Passes<NonlocalSolid<L>, D>
                     let at = base + lane - first;
                     let point = &mut points[at];
                     if point.has_gradient() {
-                        let mut moment = Tensor::<D>::from_fn(|a, b| moments[1 + a * D + b][lane]);
+                        let mut moment = BodyTensor::<D>::from_fn(|a, b| moments[1 + a * D + b][lane]);
                         let mut square = moments[0][lane];
                         // the kernel treats every bond as intact
                         for bond in among(soft, base + lane..base + lane + 1) {
                             let (lack, _, change, reference) = lack(rows, bond, displacement);
                             square += change.iter().map(|x| lack * x * x).sum::<f64>();
-                            moment += Tensor::from_fn(|a, b| lack * change[a] * reference[b]);
+                            moment += BodyTensor::from_fn(|a, b| lack * change[a] * reference[b]);
                         }
-                        point.deform(moment, Tensor::zeros(), square);
+                        point.deform(moment, BodyTensor::zeros(), square);
                         if filters {
                             continue;
                         }
@@ -207,7 +212,7 @@ impl<L: PointLaw<D>, const D: usize, const N: usize> Passes<NonlocalSolid<L>, D>
         _solid: &NonlocalSolid<L>,
         bonds: &dyn Bonds<D>,
         displacement: &Field<D>,
-        points: &[Point<D>],
+        points: &[SolidPoint<D>],
         chunk: usize,
         force: &mut [&mut [f64]; D],
         track: Option<&mut StretchRange>,

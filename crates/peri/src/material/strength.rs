@@ -1,7 +1,7 @@
 //! Uniform states in which a solid reaches its strength.
 
 use super::point_law::{Deformation, PointLaw};
-use super::tensor::Tensor;
+use super::tensor::BodyTensor;
 use polycore::numerics::bisect;
 use std::cmp::Ordering;
 
@@ -9,10 +9,13 @@ use std::cmp::Ordering;
 const GREATEST: f64 = 1e3;
 
 /// Finds uniaxial tension of stretch λ₁: the lateral stretch with free sides, by bisection.
-fn pulled<const D: usize>(law: &(impl PointLaw<D> + ?Sized), stretch: f64) -> (Deformation<D>, Tensor<D>) {
+fn pulled<const D: usize>(
+    law: &(impl PointLaw<D> + ?Sized),
+    stretch: f64,
+) -> (Deformation<D>, BodyTensor<D>) {
     let at = |side: f64| {
         let entry = |a: usize| if a == 0 { stretch - 1.0 } else { side - 1.0 };
-        let displacement_gradient = Tensor::from_fn(|a, b| if a == b { entry(a) } else { 0.0 });
+        let displacement_gradient = BodyTensor::from_fn(|a, b| if a == b { entry(a) } else { 0.0 });
         let deformation = Deformation { displacement_gradient, residual: 0.0 };
         let piola = law.respond(&deformation).piola;
         (deformation, piola)

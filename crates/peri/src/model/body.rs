@@ -4,7 +4,7 @@ use crate::bonds::{LatticeBonds, VolumeCorrection};
 use crate::calibrate::Space;
 use crate::error::Error;
 use crate::geometry::{Cut, Gaps, Operation, Shape, lattice};
-use crate::surface::Surface;
+use crate::surface::BodySurface;
 
 /// Shapes filled with particles on a regular lattice; lengths in m.
 #[derive(Clone, Debug)]
@@ -73,8 +73,8 @@ impl<const D: usize> Body<D> {
     }
 
     /// Face points of the surface.
-    pub fn surface(&self) -> Surface<D> {
-        Surface::of_shapes(&self.operations, self.spacing)
+    pub fn surface(&self) -> BodySurface<D> {
+        BodySurface::of_shapes(&self.operations, self.spacing)
     }
 
     /// Builds particles and bonds.

@@ -49,7 +49,7 @@ impl Chain {
     }
 
     /// State at parameter β ≥ 0; at ∞ the torn chain: no force, no stiffness.
-    pub fn at(&self, beta: f64) -> ChainPoint {
+    pub fn state_at(&self, beta: f64) -> ChainPoint {
         if beta == f64::INFINITY {
             return ChainPoint {
                 stretch: beta,
@@ -76,7 +76,7 @@ impl Chain {
 
     /// State at chain stretch λ̄ ≥ 0 (its magnitude is used).
     pub fn stretched(&self, stretch: f64) -> ChainPoint {
-        self.at(self.beta(stretch))
+        self.state_at(self.beta(stretch))
     }
 
     /// β at a chain stretch λ̄ (its magnitude is used): x λ_b = λ̄/√n̄. Accurate to a few ulp for the given
@@ -135,7 +135,7 @@ impl Chain {
         // and √(3D̂/2)
         let excess = |beta: f64| beta * (langevin(beta) + beta * derivative(beta)) / self.dissociation - 1.0;
         let (low, high) = (1e-3 * self.dissociation.min(1.0), 2.0 * self.dissociation.max(2.0));
-        self.at(bisected(low, high, 200, |beta| excess(beta) < 0.0))
+        self.state_at(bisected(low, high, 200, |beta| excess(beta) < 0.0))
     }
 }
 
@@ -250,7 +250,7 @@ mod tests {
             let sensitivity = beta * (slope / x + (x + beta * slope) / chain.dissociation);
             // λ̄ itself: 𝓛 3.5 ulp, the exponent 4 ulp, two roundings and √n̄
             let rounding = (6.0 + 4.0 * work) * f64::EPSILON / sensitivity;
-            let error = (chain.beta(chain.at(beta).stretch) / beta - 1.0).abs();
+            let error = (chain.beta(chain.state_at(beta).stretch) / beta - 1.0).abs();
             prop_assert!(error < rounding + 8.0 * f64::EPSILON, "{} {}", error, rounding);
         }
 
@@ -267,7 +267,8 @@ mod tests {
             prop_assert!((force - here.force).abs() < 1e-6 * here.force.max(1e-3 * here.energy / stretch));
             let stiffness = (right.force - left.force) / width;
             let scale = here.stiffness.abs() + here.force / stretch;
-            prop_assert!((stiffness - here.stiffness).abs() < 1e-6 * scale, "{} {}", stiffness, here.stiffness);
+            let error = (stiffness - here.stiffness).abs();
+            prop_assert!(error < 1e-6 * scale, "{} {}", stiffness, here.stiffness);
         }
     }
 }

@@ -137,9 +137,9 @@ impl BondPotential for NetworkStretch {
 }
 
 /// `as-published`: t = T(l). Not stress-free; a body of it collapses.
-pub struct AsPublished(pub Chain);
+pub struct PublishedChain(pub Chain);
 
-impl BondPotential for AsPublished {
+impl BondPotential for PublishedChain {
     fn tension(&self, stretch: f64) -> f64 {
         self.0.stretched(stretch).force
     }

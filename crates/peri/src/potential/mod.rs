@@ -13,7 +13,7 @@ mod tests;
 pub use chain::{Chain, ChainPoint};
 pub use energy::{EnergyTable, TangentTable};
 pub use fit::KernelFit;
-pub use laws::{AsPublished, BondStretch, LinearBond, NetworkStretch, Scaled, Shifted};
+pub use laws::{BondStretch, LinearBond, NetworkStretch, PublishedChain, Scaled, Shifted};
 pub use range::StretchRange;
 pub use softened::{DUCTILITY, integrity, onset, softened_energy};
 
@@ -135,7 +135,7 @@ impl Law {
             Self::ChainOffset => scaled(BondStretch::new(chain()?), rescale),
             Self::ChainShifted => scaled(Shifted(chain()?), rescale),
             Self::ChainAffine => scaled(NetworkStretch(chain()?), rescale),
-            Self::AsPublished => scaled(AsPublished(chain()?), rescale),
+            Self::AsPublished => scaled(PublishedChain(chain()?), rescale),
             Self::Linear => scaled(LinearBond, rescale),
         })
     }

@@ -80,7 +80,7 @@ pub(super) fn fit(samples: &[(f64, f64)], p: usize, q: usize, bound: f64) -> Opt
     None
 }
 
-struct Step {
+struct FitStep {
     ratio: Ratio,
     /// |D| at the samples.
     divisor: Vec<f64>,
@@ -96,7 +96,7 @@ fn step(
     divisor: &[f64],
     p: usize,
     q: usize,
-) -> Option<Step> {
+) -> Option<FitStep> {
     let rows = at.len();
     let scale: Vec<f64> = (0..rows).map(|i| weights[i] / divisor[i]).collect();
     let above = Orthogonal::new(at, (0..rows).map(|i| scale[i] / samples[i].1).collect(), p)?;
@@ -132,7 +132,7 @@ fn step(
         // a change of sign is a pole: worse than any error, but it may vanish in the next step
         error: if one_sign { error } else { error.max(1e-3) },
     };
-    Some(Step { ratio, divisor: divided, errors })
+    Some(FitStep { ratio, divisor: divided, errors })
 }
 
 /// Polynomials orthonormal under weights on points, by Arnoldi's recurrence (Brubeck, Nakatsukasa and

@@ -164,7 +164,7 @@ fn satisfies_the_implicit_relation() {
         for share in [0.05, 0.3, 0.7, 0.95, 1.0, 1.05, 1.2, 1.5, 2.7, 10.0] {
             let stretch = share * links.sqrt();
             let beta = chain.beta(stretch);
-            let point = chain.at(beta);
+            let point = chain.state_at(beta);
             assert!(
                 (point.stretch / stretch - 1.0).abs() < 1e-13,
                 "{share}: {}",
@@ -249,7 +249,7 @@ fn interpolation_errors_of_the_formulation() {
     };
     let graded = |n: usize| -> Vec<ChainPoint> {
         let (from, to) = (chain.beta(low).asinh(), chain.beta(high).asinh());
-        (0..n).map(|k| chain.at((from + (to - from) * k as f64 / (n - 1) as f64).sinh())).collect()
+        (0..n).map(|k| chain.state_at((from + (to - from) * k as f64 / (n - 1) as f64).sinh())).collect()
     };
     let worst = |nodes: &[ChainPoint], cubic: bool| -> f64 {
         samples

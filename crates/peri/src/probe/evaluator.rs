@@ -1,21 +1,21 @@
 //! Forces, stresses, energy-momentum and flags of a state, for bond laws and solids.
 
 use crate::bonds::Bonds;
-use crate::material::{BondMaterial, Family, NonlocalSolid, PointLaw, Pointwise, Response, Tensor as Matrix};
+use crate::material::{BodyTensor, BondMaterial, Family, NonlocalSolid, PointLaw, Pointwise, SolverMaterial};
 use crate::potential::KernelFit;
 use crate::solver::State;
-use crate::stress::{Tensor, force_over_length};
+use crate::stress::{StressTensor, force_over_length};
 use polycore::constitutive::Flags;
 use rayon::prelude::*;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// A solid of any law.
-pub type Solid<const D: usize> = NonlocalSolid<Arc<dyn PointLaw<D>>>;
+pub type AnySolid<const D: usize> = NonlocalSolid<Arc<dyn PointLaw<D>>>;
 
 /// Evaluates forces and stresses of a material in the states of a body.
-pub struct StressEvaluator<const D: usize>(Kind<D>);
+pub struct StressEvaluator<const D: usize>(EvaluatorKind<D>);
 
-enum Kind<const D: usize> {
+enum EvaluatorKind<const D: usize> {
     /// A bond law, with the solver's fit: bonds then carry the solver's forces.
     Bonds {
         material: BondMaterial<'static>,
@@ -31,33 +31,33 @@ enum Kind<const D: usize> {
     Solid {
         law: Arc<dyn PointLaw<D>>,
         learnt: bool,
-        states: Mutex<Pointwise<Solid<D>, D>>,
+        states: Mutex<Pointwise<AnySolid<D>, D>>,
     },
 }
 
 impl<const D: usize> StressEvaluator<D> {
     /// Creates an empty evaluator: no forces, no stresses.
     pub fn none() -> Self {
-        Self(Kind::Nothing)
+        Self(EvaluatorKind::Nothing)
     }
 
     /// Creates an evaluator of a bond law that is fitted to a relative error of `bound`; the law is `clamped`
     /// beyond the fitted stretches if bonds break.
-    pub fn of_bonds(material: BondMaterial<'static>, bound: f64, clamped: bool) -> Self {
-        Self(Kind::Bonds { material, bound, clamped, last: Mutex::new(None) })
+    pub fn for_bonds(material: BondMaterial<'static>, bound: f64, clamped: bool) -> Self {
+        Self(EvaluatorKind::Bonds { material, bound, clamped, last: Mutex::new(None) })
     }
 
     /// Creates an evaluator of a solid; `bonds` are those of the reference state. A law `learnt` from data
     /// has flags.
-    pub fn of_solid(law: Arc<dyn PointLaw<D>>, learnt: bool, bonds: &dyn Bonds<D>) -> Self {
+    pub fn for_solid(law: Arc<dyn PointLaw<D>>, learnt: bool, bonds: &dyn Bonds<D>) -> Self {
         let states = Mutex::new(Pointwise::new(NonlocalSolid(law.clone()), bonds));
-        Self(Kind::Solid { law, learnt, states })
+        Self(EvaluatorKind::Solid { law, learnt, states })
     }
 
     /// Bond law, if the material is one.
     pub fn bond_material(&self) -> Option<&BondMaterial<'static>> {
         match &self.0 {
-            Kind::Bonds { material, .. } => Some(material),
+            EvaluatorKind::Bonds { material, .. } => Some(material),
             _ => None,
         }
     }
@@ -73,8 +73,8 @@ impl<const D: usize> StressEvaluator<D> {
         visit: &mut dyn FnMut(usize, [f64; D]),
     ) {
         match &self.0 {
-            Kind::Nothing => {}
-            Kind::Bonds { material, bound, clamped, last } => {
+            EvaluatorKind::Nothing => {}
+            EvaluatorKind::Bonds { material, bound, clamped, last } => {
                 let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
                 if last.as_ref().is_none_or(|(stretches, _)| *stretches != state.stretches.fitted) {
                     let fit = KernelFit::new(material.law(), state.stretches.fitted, *bound).ok();
@@ -106,7 +106,7 @@ impl<const D: usize> StressEvaluator<D> {
                     visit(site, sum);
                 }
             }
-            Kind::Solid { states, .. } => {
+            EvaluatorKind::Solid { states, .. } => {
                 let states = prepared(states, bonds, state);
                 for site in sites.iter().map(|&site| site as usize) {
                     let (mut sum, volume) = ([0.0; D], bonds.volume(site));
@@ -136,7 +136,7 @@ impl<const D: usize> StressEvaluator<D> {
         wanted: &dyn Fn(usize) -> bool,
     ) -> [f64; 3] {
         let mut sum = [0.0; 3];
-        let Kind::Solid { states, .. } = &self.0 else { return sum };
+        let EvaluatorKind::Solid { states, .. } = &self.0 else { return sum };
         let states = prepared(states, bonds, state);
         for site in sites.iter().map(|&site| site as usize) {
             let (volume, points) = (bonds.volume(site), states.points());
@@ -157,8 +157,8 @@ impl<const D: usize> StressEvaluator<D> {
     }
 
     /// First Piola–Kirchhoff and Cauchy stress of a solid's law in every particle, Pa; `None` for bond laws.
-    pub fn stress(&self, bonds: &dyn Bonds<D>, state: &State<D>) -> Option<[Vec<Tensor<D>>; 2]> {
-        let Kind::Solid { law, states, .. } = &self.0 else { return None };
+    pub fn stress(&self, bonds: &dyn Bonds<D>, state: &State<D>) -> Option<[Vec<StressTensor<D>>; 2]> {
+        let EvaluatorKind::Solid { law, states, .. } = &self.0 else { return None };
         let states = prepared(states, bonds, state);
         let both = bonds.particles().iter().map(|&site| {
             let point = &states.points()[site as usize];
@@ -167,7 +167,7 @@ impl<const D: usize> StressEvaluator<D> {
             let piola = point.respond(&**law).piola * point.integrity();
             let volume = (1.0 + deformation.volume_change()) * law.thickness_stretch(deformation);
             let cauchy = piola * gradient.transpose() / volume;
-            let rows = |t: &Matrix<D>| std::array::from_fn(|a| std::array::from_fn(|b| t[(a, b)]));
+            let rows = |t: &BodyTensor<D>| std::array::from_fn(|a| std::array::from_fn(|b| t[(a, b)]));
             (rows(&piola), rows(&cauchy))
         });
         let (piola, cauchy) = both.unzip();
@@ -181,16 +181,16 @@ impl<const D: usize> StressEvaluator<D> {
         bonds: &dyn Bonds<D>,
         state: &State<D>,
         sites: &[u32],
-        visit: &mut dyn FnMut(usize, Tensor<D>),
+        visit: &mut dyn FnMut(usize, StressTensor<D>),
     ) {
-        let Kind::Solid { law, states, .. } = &self.0 else { return };
+        let EvaluatorKind::Solid { law, states, .. } = &self.0 else { return };
         let states = prepared(states, bonds, state);
         for (at, &site) in sites.iter().enumerate() {
             let point = &states.points()[site as usize];
             let Some(deformation) = point.deformation() else { continue };
             let piola = point.respond(&**law).piola;
             let tensor = (deformation.displacement_gradient.transpose() * piola
-                - Matrix::<D>::identity() * point.energy(&**law).unwrap_or(0.0))
+                - BodyTensor::<D>::identity() * point.energy(&**law).unwrap_or(0.0))
                 * point.integrity();
             visit(at, std::array::from_fn(|a| std::array::from_fn(|b| tensor[(a, b)])));
         }
@@ -199,7 +199,7 @@ impl<const D: usize> StressEvaluator<D> {
     /// Uncertainties of a learnt law, particle by particle; none for particles without it; `None` for laws in
     /// closed form.
     pub fn flags(&self, bonds: &dyn Bonds<D>, state: &State<D>) -> Option<Vec<Flags>> {
-        let Kind::Solid { law, learnt: true, states } = &self.0 else { return None };
+        let EvaluatorKind::Solid { law, learnt: true, states } = &self.0 else { return None };
         let states = prepared(states, bonds, state);
         let of = |&site: &u32| {
             states.points()[site as usize].deformation().map_or(Flags::default(), |found| law.flags(found))
@@ -219,10 +219,10 @@ impl<const D: usize> StressEvaluator<D> {
 
 /// Computes the states of particles at a displacement.
 fn prepared<'a, const D: usize>(
-    states: &'a Mutex<Pointwise<Solid<D>, D>>,
+    states: &'a Mutex<Pointwise<AnySolid<D>, D>>,
     bonds: &dyn Bonds<D>,
     state: &State<D>,
-) -> MutexGuard<'a, Pointwise<Solid<D>, D>> {
+) -> MutexGuard<'a, Pointwise<AnySolid<D>, D>> {
     let mut states = states.lock().unwrap_or_else(PoisonError::into_inner);
     states.prepare(bonds, &state.displacement);
     states

@@ -7,7 +7,7 @@
 //! particle is on the same side, and so are its neighbours. At bonds that broke later, the side is that of
 //! the nearest particle.
 
-use crate::bonds::{BodyGeometry, Bonds, CellGrid, Kind};
+use crate::bonds::{BodyGeometry, BondKind, Bonds, CellGrid};
 use crate::geometry::{Cut, length, severed};
 use nalgebra::{Matrix3, Vector3};
 
@@ -36,8 +36,8 @@ pub struct LineSampler<'a, const D: usize> {
 /// the whole edge of the square or cube of its volume.
 fn reach<const D: usize>(bonds: &dyn Bonds<D>, site: usize) -> f64 {
     match bonds.kind() {
-        Kind::Lattice(lattice) => 0.5 * lattice.spacing(),
-        Kind::Cloud(cloud) => (cloud.volume(site) / cloud.thickness()).powf(1.0 / D as f64),
+        BondKind::Lattice(lattice) => 0.5 * lattice.spacing(),
+        BondKind::Cloud(cloud) => (cloud.volume(site) / cloud.thickness()).powf(1.0 / D as f64),
     }
 }
 

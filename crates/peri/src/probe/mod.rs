@@ -9,7 +9,7 @@ mod path;
 mod section;
 
 pub use crack::{CrackTip, JIntegral};
-pub use evaluator::{Solid, StressEvaluator};
+pub use evaluator::{AnySolid, StressEvaluator};
 pub use line::LineSampler;
 pub use motion::{WaveFront, mean_displacement, rotation, strain};
 pub use path::{crossing, envelope, first_swing, load_at, unwrapped};

@@ -7,8 +7,8 @@
 //!   that grips move without resistance;
 //! - what rounding of displacements alone makes of forces, 4ε‖s u‖₂, over the tolerance.
 
-use super::passes::Sums;
-use super::scale::Balance;
+use super::force_scale::Balance;
+use super::passes::ForceSums;
 use super::state::State;
 use super::system::System;
 use crate::error::Error;
@@ -20,11 +20,11 @@ const LEAST_REFERENCE: f64 = 0.05;
 /// Rounding of displacements, in units of the last place, tolerated in forces.
 const ROUNDING: f64 = 4.0;
 /// Iterations between updates of the rounding of displacements.
-const LOOK: u64 = 50;
+const CHECK_INTERVAL: u64 = 50;
 
 /// Required balance of forces, and limits of a search.
 #[derive(Clone, Copy, Debug)]
-pub struct Goal {
+pub struct SearchLimits {
     /// Out-of-balance force over reference force.
     pub tolerance: f64,
     /// Limit of iterations.
@@ -33,7 +33,7 @@ pub struct Goal {
     pub accept: f64,
 }
 
-impl Sums {
+impl ForceSums {
     /// Returns true if every sum is finite.
     pub fn is_finite(&self) -> bool {
         let sums = [self.free, self.constrained, self.external, self.quotient_top, self.quotient_bottom];
@@ -54,8 +54,8 @@ impl Sums {
 
 impl<const D: usize> State<D> {
     /// Records the sums of an iterate: its residual, relative to the floor of its reference.
-    pub(super) fn note(&mut self, system: &System<D>, sums: &Sums, goal: &Goal) {
-        if self.counts.iteration.is_multiple_of(LOOK) || self.convergence.floor == 0.0 {
+    pub(super) fn record_sums(&mut self, system: &System<D>, sums: &ForceSums, goal: &SearchLimits) {
+        if self.counts.iteration.is_multiple_of(CHECK_INTERVAL) || self.convergence.floor == 0.0 {
             let (scale, factor) = (&system.scale, system.factors[self.step]);
             let rounding = ROUNDING * f64::EPSILON * scale.moved(&self.displacement) / goal.tolerance;
             let strained = scale.strain(factor) * scale.constrained;
@@ -70,7 +70,7 @@ impl<const D: usize> State<D> {
     ///
     /// # Errors
     /// [`Error::NotConverged`] if all iterations are used.
-    pub(super) fn is_balanced(&mut self, goal: &Goal, broken: bool) -> Result<bool, Error> {
+    pub(super) fn is_balanced(&mut self, goal: &SearchLimits, broken: bool) -> Result<bool, Error> {
         let balanced = self.convergence.residual <= goal.tolerance;
         let spent = self.counts.iteration >= goal.max_iterations;
         if !broken && (balanced || (spent && self.convergence.residual <= goal.accept)) {
@@ -102,7 +102,7 @@ impl Balance {
             }
             _ => [0.0; D],
         };
-        let rigid = system.repulsion().and_then(|contact| contact.of_planes(state.displacement.sites()));
+        let rigid = system.repulsion().and_then(|contact| contact.plane_forces(state.displacement.sites()));
         // force, external force, moment (yz, zx, xy), size
         let of = |sites: &[u32]| {
             let mut sums = [0.0; 10];

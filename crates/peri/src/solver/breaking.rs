@@ -1,7 +1,7 @@
 //! Breaking and softening of bonds.
 
 use super::criterion::{Bilinear, Criterion, Policy, most};
-use super::fracture::Event;
+use super::fracture::BreakingEvent;
 use super::state::State;
 use super::system::System;
 use crate::bonds::{Neighbour, Overstretched, Softened, fingerprint};
@@ -10,7 +10,7 @@ use crate::potential::StretchRange;
 
 /// Softening that an equilibrium may lag behind: its bonds carry up to this fraction of an intact bond's
 /// force too much.
-const LAG: f64 = 0.01;
+const SOFTENING_LAG: f64 = 0.01;
 
 /// Applies softening to bonds beyond the onset, each given with the energy that its breaking would release:
 /// returns those that break, and all softened bonds; `None` if no integrity falls by more than `lag`.
@@ -70,7 +70,7 @@ impl<const D: usize> System<'_, D> {
             Some(&Criterion::Softening(law)) => {
                 let found = self.overloaded(state, law.onset);
                 // in dynamics forces follow at once
-                let lag = if state.motion.begun { 0.0 } else { LAG };
+                let lag = if state.motion.begun { 0.0 } else { SOFTENING_LAG };
                 let changed = soften(law, &state.fracture.softened, found, lag);
                 changed.map_or_else(Vec::new, |(list, after)| {
                     softened = Some(after);
@@ -90,7 +90,7 @@ impl<const D: usize> System<'_, D> {
             |bond: &Overstretched| [bond.site, self.bonds.bond(bond.site as usize, bond.index).site as u32];
         let mut parted: Vec<[u32; 2]> = if touches { list.iter().map(pair).collect() } else { Vec::new() };
         if !list.is_empty() {
-            self.bonds.sever(&list);
+            self.bonds.break_bonds(&list);
         }
         if state.motion.begun && released.is_none() && !list.is_empty() {
             let more = self.crumble(state, &mut list);
@@ -101,7 +101,7 @@ impl<const D: usize> System<'_, D> {
         let [factor, pull, push] = state.control.balanced;
         let load = self.response(factor, (pull, push)).0;
         if bonds > 0 {
-            state.fracture.events.push(Event {
+            state.fracture.events.push(BreakingEvent {
                 step: state.step,
                 bonds,
                 fingerprint: fingerprint(&list),
@@ -119,7 +119,7 @@ impl<const D: usize> System<'_, D> {
         state.fracture.released += released
             .unwrap_or_else(|| before.unwrap_or(0.0) - self.stored_energy(state, state.stretches.observed));
         if let Some(contact) = self.contact.as_mut().filter(|_| touches) {
-            contact.part(&*self.bonds, &parted);
+            contact.add_broken_pairs(&*self.bonds, &parted);
         }
         if bonds > 0 {
             let words = state.fracture.intact.get_or_insert_with(|| self.bonds.intact());
@@ -129,7 +129,7 @@ impl<const D: usize> System<'_, D> {
             }
         }
         sites.dedup();
-        state.fracture.detached += self.release(sites.iter().copied());
+        state.fracture.detached += self.unload_detached(sites.iter().copied());
         sites
     }
 
@@ -166,7 +166,7 @@ impl<const D: usize> System<'_, D> {
             for bond in &found {
                 pairs.push([bond.site, self.bonds.bond(bond.site as usize, bond.index).site as u32]);
             }
-            self.bonds.sever(&found);
+            self.bonds.break_bonds(&found);
             ends = found.iter().map(|bond| bond.site).collect();
             list.append(&mut found);
         }
@@ -176,7 +176,7 @@ impl<const D: usize> System<'_, D> {
 
     /// Removes the body forces from particles without bonds, which nothing could balance; returns their
     /// number.
-    pub(super) fn release(&mut self, sites: impl Iterator<Item = u32>) -> u64 {
+    pub(super) fn unload_detached(&mut self, sites: impl Iterator<Item = u32>) -> u64 {
         let mut count = 0;
         for site in sites {
             if self.bonds.is_alone(site as usize) {

@@ -96,22 +96,23 @@ impl Criterion {
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Policy {
-    /// Checks in equilibrium: all overstretched bonds break at once, and a new equilibrium is sought until none is
-    /// left. Independent of the method.
+    /// Checks in equilibrium: all overstretched bonds break at once, and a new equilibrium is sought until
+    /// none is left. Independent of the method.
     #[default]
     AtEquilibrium,
-    /// Checks in every iteration of dynamic relaxation: cheaper, but breaks bonds that an overshoot stretches.
+    /// Checks in every iteration of dynamic relaxation: cheaper, but breaks bonds that an overshoot
+    /// stretches.
     EachIteration,
 }
 
 /// Stretches below this are not fitted …
 const SMALLEST_STRETCH: f64 = 1e-3;
 /// … nor below this if bonds break: beside a crack without contact bonds are crushed to zero.
-const CRUSHED: f64 = 0.1;
+const CRUSHED_STRETCH: f64 = 0.1;
 
 /// Smallest fitted stretch.
 pub(super) fn least(breaking: Option<&Breaking>) -> f64 {
-    if breaking.is_some() { CRUSHED } else { SMALLEST_STRETCH }
+    if breaking.is_some() { CRUSHED_STRETCH } else { SMALLEST_STRETCH }
 }
 
 /// Largest fitted stretch.

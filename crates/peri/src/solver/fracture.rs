@@ -6,14 +6,14 @@ use serde::{Deserialize, Serialize};
 
 /// Bonds that broke together.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Event {
+pub struct BreakingEvent {
     /// Load step, from 0.
     pub step: usize,
     /// Number of bonds.
     pub bonds: u64,
     /// Hash of the bonds: two sets of bonds of one body have different ones.
     pub fingerprint: u64,
-    /// Load of the equilibrium before, N, see [`Record::load`](super::Record::load); 0 in dynamics.
+    /// Load of the equilibrium before, N, see [`StepRecord::load`](super::Record::load); 0 in dynamics.
     pub load: f64,
 }
 
@@ -27,7 +27,7 @@ pub struct Fracture {
     /// Bonds broken so far.
     pub broken: u64,
     /// Breaking events.
-    pub events: Vec<Event>,
+    pub events: Vec<BreakingEvent>,
     /// Particles that have lost all their bonds so far.
     pub detached: u64,
     /// Energy of broken bonds when they broke, plus that dissipated by softening, J.

@@ -9,14 +9,14 @@ use std::collections::{BTreeMap, HashMap};
 
 /// Distance across their relative motion, in spacings, within which a particle of one grip passes through one
 /// of another.
-const MEETS: f64 = 0.75;
+const PASSING_DISTANCE: f64 = 0.75;
 /// Most grips that move rigidly: displacements of more follow a field.
 const MOST_GRIPS: usize = 16;
 /// Allowed alternatives, for messages.
 pub const INVERTS: &str =
     "displacements that leave the body right side out; reduce them, or hold the regions farther apart";
 /// D λ_min of the shape tensor below which neighbours do not span space.
-const SPANS: f64 = 0.1;
+const LEAST_SHAPE: f64 = 0.1;
 
 /// Describes prescribed displacements that press a body through itself at any of the load factors `factors`,
 /// or between them; `None` if there are none.
@@ -61,9 +61,8 @@ fn passing<const D: usize>(bonds: &dyn BodyGeometry<D>, loads: &Loads<D>, factor
                 let at: Vec<String> = at.iter().map(|x| format!("{:.4}", x * 1e3)).collect();
                 let [own, other] = [own, other].map(|u| u.map(|x| format!("{:.4}", x * 1e3)).join(", "));
                 return Some(format!(
-                    "prescribed displacements of ({own}) mm and ({other}) mm: from load factor {factor:.4} on \
-                    the two regions pass \
-                     through each other at X = ({}) mm",
+                    "prescribed displacements of ({own}) mm and ({other}) mm: from load factor \
+                     {factor:.4} on the two regions pass through each other at X = ({}) mm",
                     at.join(", ")
                 ));
             }
@@ -111,7 +110,7 @@ fn passes<const D: usize>(
             for (other, off, at) in cells.get(&near).into_iter().flatten() {
                 let distance = (0..D).map(|d| (across[d] - off[d]).powi(2)).sum::<f64>().sqrt();
                 let factor = (other - s) / length;
-                let meets = distance < MEETS * spacing && (other - s).abs() > 0.5 * spacing;
+                let meets = distance < PASSING_DISTANCE * spacing && (other - s).abs() > 0.5 * spacing;
                 if meets && factor > low && factor < high {
                     let sooner = first.is_none_or(|(_, known)| factor.abs() < known.abs());
                     first = if sooner { Some((bonds.position(*at), factor)) } else { first };
@@ -161,7 +160,7 @@ fn turned<const D: usize>(bonds: &dyn BodyGeometry<D>, loads: &Loads<D>, factors
         };
         let shape = tensor(&shape, 1.0) / weight;
         let shape = nalgebra::Matrix3::from_fn(|a, b| if a == b && a >= D { 1.0 } else { shape[(a, b)] });
-        let spans = weight > 0.0 && D as f64 * shape.symmetric_eigenvalues().min() > SPANS;
+        let spans = weight > 0.0 && D as f64 * shape.symmetric_eigenvalues().min() > LEAST_SHAPE;
         let Some(inverse) = shape.try_inverse().filter(|_| spans) else { continue };
         let gradient = tensor(&moment, 0.0) / weight * inverse;
         // particles of one grip are alike

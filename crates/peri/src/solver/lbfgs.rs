@@ -2,12 +2,12 @@
 //! Wright, Numerical Optimization (2006), §7.2; the step ends where the slope along the direction has fallen
 //! enough (the curvature condition), found by secants.
 
-use super::balance::Goal;
+use super::balance::SearchLimits;
+use super::lbfgs_memory::LbfgsMemory;
 use super::load_stepping::{Equilibrium, QuasiStatic};
-use super::memory::Memory;
 use super::method::Watch;
-use super::passes::{Sums, gradient_pass};
-use super::places::Places;
+use super::particle_map::ParticleMap;
+use super::passes::{ForceSums, gradient_pass};
 use super::preconditioner::Preconditioner;
 use super::record::Status;
 use super::state::State;
@@ -24,7 +24,7 @@ const ITERATIONS: u64 = 200;
 /// Iterations between checks of contact.
 const TOUCHES: u64 = 10;
 /// … and growth of a search over the first one with it, or over so few iterations.
-const WORN: u64 = 2;
+const WORN_GROWTH: u64 = 2;
 const FEW: u64 = 10;
 /// σ: fraction of the first slope that may remain.
 const SLOPE: f64 = 0.9;
@@ -41,9 +41,9 @@ const CRUSH: f64 = 0.6;
 
 /// Largest change of a bond over its length in a step with softening bonds, so that none jumps over its
 /// energy's maximum.
-const LEAP: f64 = 0.3;
+const LARGEST_CHANGE: f64 = 0.3;
 /// Scale at which a direction exceeds the bonds by far; a power of 2, so that nothing is rounded.
-const FAR: f64 = (1_u64 << 40) as f64;
+const HUGE_SCALE: f64 = (1_u64 << 40) as f64;
 
 /// Quasi-static solution by limited-memory BFGS with a two-level preconditioner: the fastest method and the
 /// first choice for equilibria, with and without breaking bonds.
@@ -79,8 +79,8 @@ impl Default for Lbfgs {
 }
 
 impl Lbfgs {
-    fn goal(&self) -> Goal {
-        Goal { tolerance: self.tolerance, max_iterations: self.max_iterations, accept: self.accept }
+    fn goal(&self) -> SearchLimits {
+        SearchLimits { tolerance: self.tolerance, max_iterations: self.max_iterations, accept: self.accept }
     }
 }
 
@@ -94,9 +94,9 @@ impl<const D: usize> QuasiStatic<D> for Lbfgs {
 pub struct LbfgsSolver<const D: usize> {
     settings: Lbfgs,
     preconditioner: Preconditioner<D>,
-    memory: Memory<D>,
+    memory: LbfgsMemory<D>,
     /// Positions of particles in storage: all fields below are over particles.
-    places: Places,
+    places: ParticleMap,
     /// Gradients −V F of the energy at the iterate and at the trial, 0 where constrained.
     gradient: Field<D>,
     trial: Field<D>,
@@ -117,17 +117,17 @@ pub struct LbfgsSolver<const D: usize> {
 
 /// A point along a search direction.
 #[derive(Clone, Copy)]
-struct Point {
-    sums: Sums,
+struct LinePoint {
+    sums: ForceSums,
     observed: StretchRange,
     /// Derivative of the energy along the direction.
     slope: f64,
 }
 
 /// Result of a line search.
-enum Search {
+enum LineSearch {
     /// Accepted step.
-    Found(f64, Point),
+    Found(f64, LinePoint),
     /// No step found: the iterate is unchanged.
     Failed,
 }
@@ -138,8 +138,8 @@ impl<const D: usize> LbfgsSolver<D> {
         Self {
             settings,
             preconditioner: Preconditioner::new(),
-            memory: Memory::new(settings.memory),
-            places: Places::default(),
+            memory: LbfgsMemory::new(settings.memory),
+            places: ParticleMap::default(),
             gradient: Field::zeros(0),
             trial: Field::zeros(0),
             image: Field::zeros(0),
@@ -173,7 +173,7 @@ impl<const D: usize> LbfgsSolver<D> {
         ];
         if fields[0].sites() != particles {
             fields.into_iter().for_each(|field| *field = Field::zeros(particles));
-            self.places = Places::new(&*system.bonds, &system.loads);
+            self.places = ParticleMap::new(&*system.bonds, &system.loads);
         }
         self.memory.clear(true);
         self.local_only = false;
@@ -188,23 +188,23 @@ impl<const D: usize> LbfgsSolver<D> {
     }
 
     /// Computes forces at the present displacement; their gradient goes to `self.trial`.
-    fn evaluate(&mut self, system: &mut System<D>, state: &mut State<D>) -> Point {
+    fn evaluate(&mut self, system: &mut System<D>, state: &mut State<D>) -> LinePoint {
         let factor = system.factors[state.step];
         system.prepare(&state.displacement);
         let body = (&self.places, self.preconditioner.volumes());
         let (sums, observed, slope) =
             gradient_pass(system, state, body, &self.direction, factor, &mut self.trial);
         system.count_evaluation(state);
-        Point { sums, observed, slope }
+        LinePoint { sums, observed, slope }
     }
 
     /// Evaluates, and again if the fitted law had to be widened.
-    fn look(&mut self, system: &mut System<D>, state: &mut State<D>) -> Result<Point, Error> {
+    fn evaluate_covered(&mut self, system: &mut System<D>, state: &mut State<D>) -> Result<LinePoint, Error> {
         let point = self.evaluate(system, state);
         if !point.sums.is_finite() {
             return Ok(point);
         }
-        state.stretches.see(point.observed);
+        state.stretches.observe(point.observed);
         Ok(if system.widen(state)? { self.evaluate(system, state) } else { point })
     }
 
@@ -230,9 +230,9 @@ impl<const D: usize> LbfgsSolver<D> {
         &mut self,
         system: &mut System<D>,
         state: &mut State<D>,
-        start: &Point,
+        start: &LinePoint,
         slope: f64,
-    ) -> Result<Search, Error> {
+    ) -> Result<LineSearch, Error> {
         let [least, most] = allowed(start.observed);
         let longest = self.longest_step(system, state, most);
         // the slope is too steep below `low`; above `high` it has turned, or the body is torn
@@ -249,12 +249,12 @@ impl<const D: usize> LbfgsSolver<D> {
                 step = low + (high - low) * (1.0 / excess).clamp(1e-6, 0.5);
                 continue;
             }
-            state.stretches.see(rough.observed);
+            state.stretches.observe(rough.observed);
             let point = if system.widen(state)? { self.evaluate(system, state) } else { rough };
             if point.sums.residual(state.convergence.floor) <= self.settings.tolerance
                 || point.slope.abs() <= SLOPE * slope.abs()
             {
-                return Ok(Search::Found(step, point));
+                return Ok(LineSearch::Found(step, point));
             }
             let change = point.slope - low_slope;
             let secant = if change > 0.0 { low - low_slope * (step - low) / change } else { f64::INFINITY };
@@ -264,14 +264,14 @@ impl<const D: usize> LbfgsSolver<D> {
             } else {
                 // hardly any curvature so far: farther, unless the step is limited or long enough
                 if high.is_finite() || trial > 2 || step >= longest {
-                    return Ok(Search::Found(step, point));
+                    return Ok(LineSearch::Found(step, point));
                 }
                 (low, low_slope) = (step, point.slope);
                 step = secant.clamp(1.5 * step, GROWTH * step).min(longest);
             }
         }
         self.step(state, -at);
-        Ok(Search::Failed)
+        Ok(LineSearch::Failed)
     }
 
     /// Longest step along the direction if bonds soften at stretches up to e = `most`, or particles are in
@@ -292,8 +292,8 @@ impl<const D: usize> LbfgsSolver<D> {
         if !softens {
             return longest;
         }
-        let range = stretch_range(&*system.bonds, &spread(FAR));
-        (LEAP * FAR / (1.0 + range.high).sqrt()).min(longest)
+        let range = stretch_range(&*system.bonds, &spread(HUGE_SCALE));
+        (LARGEST_CHANGE * HUGE_SCALE / (1.0 + range.high).sqrt()).min(longest)
     }
 
     /// Runs one iteration from `point`; returns the next iterate, `None` if no direction gave a descent.
@@ -301,14 +301,14 @@ impl<const D: usize> LbfgsSolver<D> {
         &mut self,
         system: &mut System<D>,
         state: &mut State<D>,
-        point: &Point,
-    ) -> Result<Option<Point>, Error> {
+        point: &LinePoint,
+    ) -> Result<Option<LinePoint>, Error> {
         let slope = self.direct();
         if slope == 0.0 || !slope.is_finite() {
             return Ok(None);
         }
         match self.search(system, state, point, slope)? {
-            Search::Found(step, point) => {
+            LineSearch::Found(step, point) => {
                 std::mem::swap(&mut self.gradient, &mut self.trial);
                 self.preconditioner.apply(
                     &self.places,
@@ -326,7 +326,7 @@ impl<const D: usize> LbfgsSolver<D> {
                 std::mem::swap(&mut self.image, &mut self.trial_image);
                 Ok(Some(point))
             }
-            Search::Failed => Ok(None),
+            LineSearch::Failed => Ok(None),
         }
     }
 
@@ -348,8 +348,8 @@ impl<const D: usize> LbfgsSolver<D> {
     }
 
     /// Computes forces and gradient of an iterate that no search produced.
-    fn arrive(&mut self, system: &mut System<D>, state: &mut State<D>) -> Result<Point, Error> {
-        let point = self.look(system, state)?;
+    fn arrive(&mut self, system: &mut System<D>, state: &mut State<D>) -> Result<LinePoint, Error> {
+        let point = self.evaluate_covered(system, state)?;
         if !point.sums.is_finite() {
             return Err(system.not_finite(state));
         }
@@ -383,12 +383,12 @@ impl<const D: usize> Equilibrium<D> for LbfgsSolver<D> {
         let mut point = self.arrive(system, state)?;
         let mut broken = false;
         loop {
-            state.note(system, &point.sums, &goal);
+            state.record_sums(system, &point.sums, &goal);
             if state.is_balanced(&goal, broken)? {
                 let took = state.counts.total_iterations - before;
                 self.first = if self.searches == 0 { took } else { self.first };
                 self.searches += 1;
-                self.worn = took > WORN * self.first.max(FEW);
+                self.worn = took > WORN_GROWTH * self.first.max(FEW);
                 return Ok(Some(point.observed));
             }
             broken = false;
@@ -404,8 +404,8 @@ impl<const D: usize> Equilibrium<D> for LbfgsSolver<D> {
                 let sites = system.break_bonds(state);
                 broken = !sites.is_empty();
                 if broken {
-                    self.broke(system, &sites);
-                    system.refuse_adrift(state, self.settings.tolerance)?;
+                    self.bonds_broke(system, &sites);
+                    system.refuse_unsupported(state, self.settings.tolerance)?;
                     point = self.arrive(system, state)?;
                 }
             }
@@ -419,8 +419,8 @@ impl<const D: usize> Equilibrium<D> for LbfgsSolver<D> {
         }
     }
 
-    fn broke(&mut self, system: &System<D>, sites: &[u32]) {
-        self.preconditioner.broke(&*system.bonds, sites);
+    fn bonds_broke(&mut self, system: &System<D>, sites: &[u32]) {
+        self.preconditioner.bonds_broke(&*system.bonds, sites);
         self.memory.clear(false);
     }
 

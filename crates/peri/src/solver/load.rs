@@ -1,7 +1,7 @@
 //! Loads and supports: body forces and prescribed displacement components, proportional to one load factor
 //! except in rotating regions.
 
-use super::turn::Turned;
+use super::rotation::RotatingRegion;
 use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field};
 use rayon::prelude::*;
@@ -28,7 +28,7 @@ pub struct Loads<const D: usize> {
     /// Sites of each region of prescribed displacement, in the order given.
     pub held_regions: Vec<Vec<u32>>,
     /// Regions that rotate about an axis.
-    pub turned: Vec<Turned<D>>,
+    pub turned: Vec<RotatingRegion<D>>,
 }
 
 impl<const D: usize> Loads<D> {

@@ -1,8 +1,8 @@
 //! Load stepping: a first guess, an equilibrium, the bonds that break in it, the next equilibrium.
 
-use super::method::{Finished, Method, Watch};
-use super::record::Record;
-use super::scale::{Balance, Scale};
+use super::force_scale::{Balance, ForceScale};
+use super::method::{Method, StepCallback, Watch};
+use super::record::StepRecord;
 use super::state::State;
 use super::system::System;
 
@@ -25,7 +25,7 @@ pub trait Equilibrium<const D: usize> {
     ) -> Result<Option<StretchRange>, Error>;
 
     /// Updates for the sites whose bonds have broken since the last equilibrium.
-    fn broke(&mut self, system: &System<D>, sites: &[u32]);
+    fn bonds_broke(&mut self, system: &System<D>, sites: &[u32]);
 
     /// Required out-of-balance force over its reference.
     fn tolerance(&self) -> f64;
@@ -44,7 +44,7 @@ impl<const D: usize, M: QuasiStatic<D>> Method<D> for M {
         system: &mut System<D>,
         state: &mut State<D>,
         watch: &mut Watch<D>,
-        finished: &mut Finished<D>,
+        finished: &mut StepCallback<D>,
     ) -> Result<(), Error> {
         load_stepping(&mut self.solver(), system, state, watch, finished)
     }
@@ -62,7 +62,7 @@ pub fn load_stepping<const D: usize>(
     system: &mut System<D>,
     state: &mut State<D>,
     watch: &mut Watch<D>,
-    finished: &mut Finished<D>,
+    finished: &mut StepCallback<D>,
 ) -> Result<(), Error> {
     if state.step == 0 && !state.control.predicted {
         system.refuse_inverted(&system.factors)?;
@@ -79,16 +79,16 @@ fn step_by_step<const D: usize>(
     system: &mut System<D>,
     state: &mut State<D>,
     watch: &mut Watch<D>,
-    finished: &mut Finished<D>,
+    finished: &mut StepCallback<D>,
 ) -> Result<(), Error> {
     let stiffness = system.stiffness_at_rest();
     // from the reference state: an interrupted run must make the same guess
     let predictor = system.loads.affine_predictor(&*system.bonds, stiffness);
-    system.scale = Scale::new(&*system.bonds, &system.loads, stiffness);
+    system.scale = ForceScale::new(&*system.bonds, &system.loads, stiffness);
     let shortest = system.shortest();
     system.restore(state)?;
     let (tolerance, forced) = (method.tolerance(), system.loads.body_force.is_some());
-    system.refuse_adrift(state, tolerance)?;
+    system.refuse_unsupported(state, tolerance)?;
     'steps: while state.step < system.factors.len() {
         if !state.control.predicted && system.friction().is_some() {
             state.contact.start = Some(state.displacement.clone());
@@ -139,8 +139,8 @@ fn step_by_step<const D: usize>(
                 break;
             }
             state.control.cuts = 0;
-            method.broke(system, &sites);
-            system.refuse_adrift(state, tolerance)?;
+            method.bonds_broke(system, &sites);
+            system.refuse_unsupported(state, tolerance)?;
             finished(&*system.bonds, state)?;
             let particles = system.bonds.particles();
             particles.iter().for_each(|&site| state.velocity.set(site as usize, [0.0; D]));
@@ -251,7 +251,7 @@ fn record<const D: usize>(system: &mut System<D>, state: &mut State<D>) {
     let stored = system.stored_energy(state, system.fitted_part(observed));
     let row = system.row(state, state.control.balanced, observed, stored);
     let (residual, rounds) = (state.convergence.residual, state.control.round);
-    state.history.push(Record { residual, rounds, balance, time: 0.0, kinetic: 0.0, damped: 0.0, ..row });
+    state.history.push(StepRecord { residual, rounds, balance, time: 0.0, kinetic: 0.0, damped: 0.0, ..row });
 }
 
 /// Returns true if the load has fallen below the fraction of its largest value at which the run stops.

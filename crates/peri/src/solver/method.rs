@@ -8,7 +8,7 @@ use crate::error::Error;
 pub type Watch<'a, const D: usize> = dyn FnMut(&Status, &State<D>) -> Result<(), Error> + 'a;
 
 /// Callback of every finished step, with the bonds and the state; may stop the solution by an error.
-pub type Finished<'a, const D: usize> = dyn FnMut(&dyn Bonds<D>, &State<D>) -> Result<(), Error> + 'a;
+pub type StepCallback<'a, const D: usize> = dyn FnMut(&dyn Bonds<D>, &State<D>) -> Result<(), Error> + 'a;
 
 /// A method that solves a system to the end of its loads: [`Lbfgs`](super::Lbfgs) (equilibria, the first
 /// choice), [`DynamicRelaxation`](super::DynamicRelaxation) (equilibria),
@@ -23,7 +23,7 @@ pub trait Method<const D: usize> {
         system: &mut System<D>,
         state: &mut State<D>,
         watch: &mut Watch<D>,
-        finished: &mut Finished<D>,
+        finished: &mut StepCallback<D>,
     ) -> Result<(), Error>;
 
     /// Runs [`Self::solve`] to the end without callbacks.

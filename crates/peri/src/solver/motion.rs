@@ -15,11 +15,12 @@ pub struct Motion {
     /// Bounds of the time step.
     pub limits: StepLimits,
     /// Energies.
-    pub energies: Energies,
+    pub energies: DynamicEnergies,
     /// Stretches at the last check.
     pub(super) look: StretchLook,
-    /// Stiffness control of materials whose stiffness depends on the displacement, see [`super::pace`].
-    pub(super) pace: Pace,
+    /// Stiffness control of materials whose stiffness depends on the displacement, see
+    /// [`super::stiffness_control`].
+    pub(super) pace: StiffnessControl,
 }
 
 /// Sequence of equal time steps.
@@ -58,7 +59,7 @@ pub struct StepLimits {
 
 /// Energies of explicit dynamics, J.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Energies {
+pub struct DynamicEnergies {
     /// Kinetic energy.
     pub kinetic: f64,
     /// Energy dissipated by damping.
@@ -91,9 +92,9 @@ pub struct BondSums {
     pub extent: f64,
 }
 
-/// Greatest frequency, as far as known, see [`super::pace`].
+/// Greatest frequency, as far as known, see [`super::stiffness_control`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Pace {
+pub struct StiffnessControl {
     /// m when ω² was last measured, N/m⁴, and r.
     pub(super) bound: f64,
     pub(super) part: f64,

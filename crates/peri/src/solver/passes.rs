@@ -2,7 +2,7 @@
 //! the gradient of L-BFGS.
 
 use super::load::Loads;
-use super::places::Places;
+use super::particle_map::ParticleMap;
 use super::state::State;
 use super::system::System;
 use crate::bonds::StretchRange;
@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 /// Sums over all sites, item by item in a fixed order.
 #[derive(Clone, Copy, Default)]
-pub struct Sums {
+pub struct ForceSums {
     /// Σ v·ΔF over free components.
     pub quotient_top: f64,
     /// Σ M v² over free components.
@@ -25,7 +25,7 @@ pub struct Sums {
     pub external: f64,
 }
 
-impl Sums {
+impl ForceSums {
     fn add(mut self, other: Self) -> Self {
         self.quotient_top += other.quotient_top;
         self.quotient_bottom += other.quotient_bottom;
@@ -44,11 +44,11 @@ pub fn force_pass<const D: usize>(
     mass: f64,
     factor: f64,
     look: bool,
-) -> (Sums, StretchRange) {
+) -> (ForceSums, StretchRange) {
     let sites = system.bonds.sites();
     let loads = &*system.loads;
     let (displacement, velocity) = (&state.displacement, state.velocity.components());
-    let results: Vec<(Sums, StretchRange)> = state
+    let results: Vec<(ForceSums, StretchRange)> = state
         .force
         .chunks_mut()
         .into_par_iter()
@@ -62,7 +62,7 @@ pub fn force_pass<const D: usize>(
                     std::array::from_fn(|_| &mut parts.next().unwrap_or_default()[..range.len()]);
                 let mut observed = StretchRange::REST;
                 system.internal_force(displacement, chunk * CHUNK, &mut new, look.then_some(&mut observed));
-                let mut sums = Sums::default();
+                let mut sums = ForceSums::default();
                 let constrained = loads.constrained.get(range.clone()).unwrap_or_default();
                 for d in 0..D {
                     if let Some(body) = &loads.body_force {
@@ -94,12 +94,13 @@ pub fn force_pass<const D: usize>(
             },
         )
         .collect();
-    let all = results.into_iter().fold((Sums::default(), StretchRange::REST), |(sums, observed), (s, m)| {
-        (sums.add(s), observed.join(m))
-    });
+    let all =
+        results.into_iter().fold((ForceSums::default(), StretchRange::REST), |(sums, observed), (s, m)| {
+            (sums.add(s), observed.join(m))
+        });
     let (mut sums, observed) = all;
     // planes hold a body, too
-    sums.constrained += system.repulsion().map_or(0.0, |contact| contact.square_of_planes());
+    sums.constrained += system.repulsion().map_or(0.0, |contact| contact.plane_force_square());
     (sums, observed)
 }
 
@@ -108,23 +109,23 @@ pub fn force_pass<const D: usize>(
 pub fn gradient_pass<const D: usize>(
     system: &System<D>,
     state: &mut State<D>,
-    (places, volumes): (&Places, &[f64]),
+    (places, volumes): (&ParticleMap, &[f64]),
     direction: &Field<D>,
     factor: f64,
     gradient: &mut Field<D>,
-) -> (Sums, StretchRange, f64) {
+) -> (ForceSums, StretchRange, f64) {
     let (sites, loads, displacement) = (system.bonds.sites(), &*system.loads, &state.displacement);
     let direction = direction.components();
     let items = state.force.chunks_mut().into_par_iter().zip(places.parts_mut(gradient)).enumerate();
     // one work item at a time if there are hardly any
     let items = items.with_min_len(if sites <= 2 * CHUNK && D == 2 { 2 } else { 1 });
-    let results: Vec<(Sums, StretchRange, f64)> = items
+    let results: Vec<(ForceSums, StretchRange, f64)> = items
         .map(|(item, (mut force, gradient))| {
             let mut observed = StretchRange::REST;
             system.internal_force(displacement, item * CHUNK, &mut force, Some(&mut observed));
-            let (mut sums, mut slope) = (Sums::default(), 0.0);
+            let (mut sums, mut slope) = (ForceSums::default(), 0.0);
             let particles = places.of_item(item);
-            let held = places.held(particles.clone());
+            let held = places.constrained(particles.clone());
             for d in 0..D {
                 if let Some(body) = &loads.body_force {
                     for (f, b) in force[d].iter_mut().zip(&body.components()[d][chunk_range(item, sites)]) {
@@ -147,12 +148,12 @@ pub fn gradient_pass<const D: usize>(
             (sums, observed, slope)
         })
         .collect();
-    let start = (Sums::default(), StretchRange::REST, 0.0);
+    let start = (ForceSums::default(), StretchRange::REST, 0.0);
     let (mut sums, observed, slope) = results.into_iter().fold(start, |(sums, observed, slope), item| {
         (sums.add(item.0), observed.join(item.1), slope + item.2)
     });
     // planes hold a body, too
-    sums.constrained += system.repulsion().map_or(0.0, |contact| contact.square_of_planes());
+    sums.constrained += system.repulsion().map_or(0.0, |contact| contact.plane_force_square());
     (sums, observed, slope)
 }
 
@@ -215,9 +216,9 @@ struct FreeSums<'a> {
 }
 
 impl NullaryFnOnce for FreeSums<'_> {
-    type Output = Sums;
+    type Output = ForceSums;
     #[inline(always)]
-    fn call(self) -> Sums {
+    fn call(self) -> ForceSums {
         let (mut top, mut bottom, mut square) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
         let [(new, last), (old, last_old), (v, last_v), (m, last_m)] =
             [self.new, self.old, self.v, self.m].map(|numbers| numbers.as_chunks::<LANES>());
@@ -234,11 +235,11 @@ impl NullaryFnOnce for FreeSums<'_> {
             bottom[lane] += last_v[lane] * last_v[lane] * last_m[lane];
             square[lane] += last[lane] * last[lane];
         }
-        Sums {
+        ForceSums {
             quotient_top: sum(&top),
             quotient_bottom: sum(&bottom) * self.mass,
             free: sum(&square),
-            ..Sums::default()
+            ..ForceSums::default()
         }
     }
 }
@@ -266,14 +267,14 @@ pub fn move_pass<const D: usize>(
             let (f, m) = (&force[d][range.clone()], &unit_mass[range.clone()]);
             let (u, v) = (&mut *u[d], &mut *v[d]);
             let held = if constrained.iter().all(|h| h >> d & 1 == 0) { &[] } else { constrained };
-            Arch::new().dispatch(Move { f, m, u, v, held, bit: 1 << d, keep, push });
+            Arch::new().dispatch(RelaxationMove { f, m, u, v, held, bit: 1 << d, keep, push });
         }
     });
 }
 
 /// Runs [`move_pass`] over a component of a work item. If `held` is not empty, components with the `bit`
 /// stay.
-struct Move<'a> {
+struct RelaxationMove<'a> {
     f: &'a [f64],
     m: &'a [f64],
     u: &'a mut [f64],
@@ -284,7 +285,7 @@ struct Move<'a> {
     push: f64,
 }
 
-impl NullaryFnOnce for Move<'_> {
+impl NullaryFnOnce for RelaxationMove<'_> {
     type Output = ();
     #[inline(always)]
     fn call(self) {

@@ -1,9 +1,9 @@
 //! Approximate inverse of the body's stiffness, for gradients of its energy: B g = ω g/(V M) + P A_c⁻¹ Pᵀ g,
 //! with the Gershgorin mass M of dynamic relaxation and a coarse level.
 
-use super::coarse::{Anchor, Body, Coarse, Survey};
+use super::coarse::{BondCounts, CoarseBody, CoarseLevel, PlaneAnchor};
 use super::mass::{has_own_mass, own_mass, update_unit_mass};
-use super::places::{Places, in_order};
+use super::particle_map::{ParticleMap, in_order};
 use super::state::State;
 use super::system::System;
 use crate::bonds::BodyGeometry;
@@ -25,7 +25,7 @@ pub struct Preconditioner<const D: usize> {
     unit_mass: Vec<f64>,
     /// The smallest of `local`, used for unsupported particles.
     least: f64,
-    coarse: Option<Coarse<D>>,
+    coarse: Option<CoarseLevel<D>>,
 }
 
 impl<const D: usize> Preconditioner<D> {
@@ -50,7 +50,7 @@ impl<const D: usize> Preconditioner<D> {
         }
         let system = &*system;
         let (bonds, sites) = (&*system.bonds, system.bonds.sites());
-        let survey = Survey::new(bonds, &state.displacement);
+        let survey = BondCounts::new(bonds, &state.displacement);
         self.unit_mass.resize(sites, 1.0);
         self.volumes = bonds.particles().iter().map(|&site| bonds.volume(site as usize)).collect();
         update_unit_mass(bonds, bonds.particles(), &mut self.unit_mass);
@@ -73,7 +73,7 @@ impl<const D: usize> Preconditioner<D> {
                     springs[site] += stiffness * weight * weight / bonds.volume(site);
                     head = if weight > head.1 { (site, weight) } else { head };
                 }
-                anchors.push(Anchor { site: head.0 as u32, normal, stiffness });
+                anchors.push(PlaneAnchor { site: head.0 as u32, normal, stiffness });
             });
         }
         let local = |(&site, volume): (&u32, &f64)| {
@@ -86,7 +86,7 @@ impl<const D: usize> Preconditioner<D> {
             self.least = 1.0;
         }
         self.local.iter_mut().filter(|local| local.is_infinite()).for_each(|local| *local = self.least);
-        let body = Body {
+        let body = CoarseBody {
             bonds,
             loads: &system.loads,
             displacement: &state.displacement,
@@ -97,11 +97,11 @@ impl<const D: usize> Preconditioner<D> {
         };
         let old = self.coarse.take();
         let most = (self.volumes.len() / SHARE[D - 2]).clamp(LEAST[D - 2], MOST[D - 2]);
-        self.coarse = Coarse::new(&body, coarsening * bonds.spacing(), most, old);
+        self.coarse = CoarseLevel::new(&body, coarsening * bonds.spacing(), most, old);
     }
 
     /// Updates the local part where bonds broke; the coarse part stays.
-    pub fn broke(&mut self, bonds: &dyn BodyGeometry<D>, sites: &[u32]) {
+    pub fn bonds_broke(&mut self, bonds: &dyn BodyGeometry<D>, sites: &[u32]) {
         let before: Vec<f64> = sites.iter().map(|&site| self.unit_mass[site as usize]).collect();
         update_unit_mass(bonds, sites, &mut self.unit_mass);
         for (&site, before) in sites.iter().zip(before) {
@@ -114,7 +114,13 @@ impl<const D: usize> Preconditioner<D> {
 
     /// Computes z = B g over particles, or its local part only; g and z are zero where components are
     /// constrained.
-    pub fn apply(&mut self, places: &Places, gradient: &Field<D>, result: &mut Field<D>, local_only: bool) {
+    pub fn apply(
+        &mut self,
+        places: &ParticleMap,
+        gradient: &Field<D>,
+        result: &mut Field<D>,
+        local_only: bool,
+    ) {
         if let Some(coarse) = self.coarse.as_mut().filter(|_| !local_only) {
             coarse.solve(gradient);
         }
@@ -137,7 +143,7 @@ impl<const D: usize> Preconditioner<D> {
                     z[d][particle - start] += value[d];
                 }
             }
-            for &(particle, components) in places.held(range) {
+            for &(particle, components) in places.constrained(range) {
                 for d in (0..D).filter(|d| components >> d & 1 == 1) {
                     z[d][particle - start] = 0.0;
                 }
@@ -152,6 +158,6 @@ impl<const D: usize> Preconditioner<D> {
 
     /// Degrees of freedom of the coarse level and entries of its factors.
     pub fn coarse_size(&self) -> [usize; 2] {
-        self.coarse.as_ref().map_or([0; 2], Coarse::size)
+        self.coarse.as_ref().map_or([0; 2], CoarseLevel::size)
     }
 }

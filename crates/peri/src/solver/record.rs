@@ -1,12 +1,12 @@
 //! Rows of a run's history, and the status of an iteration.
 
-use super::scale::Balance;
+use super::force_scale::Balance;
 use crate::contact::{ContactSummary, PlaneReaction};
 use serde::{Deserialize, Serialize};
 
 /// Row of the history: a load step in equilibrium, or a time of a dynamic solution.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Record {
+pub struct StepRecord {
     /// Load factor.
     pub factor: f64,
     /// Force, N, that does the loads' work on `displacement`, see
@@ -55,11 +55,11 @@ pub struct Record {
 }
 
 /// Scalar of a step: name, unit, value.
-type Scalar = (&'static str, &'static str, fn(&Record) -> f64);
+type RecordScalar = (&'static str, &'static str, fn(&StepRecord) -> f64);
 
-impl Record {
+impl StepRecord {
     /// Scalars of every step.
-    pub const SCALARS: [Scalar; 12] = [
+    pub const SCALARS: [RecordScalar; 12] = [
         ("displacement", "m", |record| record.displacement),
         ("load", "N", |record| record.load),
         ("factor", "", |record| record.factor),

@@ -1,8 +1,8 @@
 //! Responses that snap back: if more bonds would break at once after a break, the load is lowered until none
 //! would. The next break then controls the load, so that a crack advances event by event through equilibria.
 
-use super::cut::BY_STRETCH;
 use super::state::State;
+use super::step_cuts::BY_STRETCH;
 use super::system::System;
 
 impl<const D: usize> System<'_, D> {

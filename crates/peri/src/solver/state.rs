@@ -2,9 +2,9 @@
 
 use super::fracture::Fracture;
 use super::motion::Motion;
-use super::record::{Record, Status};
-use super::steps::{Accepted, StepControl};
-use crate::contact::Grip;
+use super::record::{Status, StepRecord};
+use super::step_control::{Accepted, StepControl};
+use crate::contact::FrictionPair;
 use crate::field::Field;
 use crate::potential::StretchRange;
 use serde::{Deserialize, Serialize};
@@ -24,9 +24,9 @@ pub struct State<const D: usize> {
     /// Work of the solution.
     pub counts: Counts,
     /// Stretches of the body, and of the fitted law.
-    pub stretches: Stretches,
+    pub stretches: BodyStretches,
     /// Out-of-balance forces and their references.
-    pub convergence: Convergence,
+    pub convergence: ForceResiduals,
     /// Broken and softened bonds.
     pub fracture: Fracture,
     /// Friction and moving planes.
@@ -38,7 +38,7 @@ pub struct State<const D: usize> {
     /// Work of the loads so far, J.
     pub work: f64,
     /// Finished steps.
-    pub history: Vec<Record>,
+    pub history: Vec<StepRecord>,
 }
 
 /// Counts of iterations and evaluations.
@@ -69,7 +69,7 @@ impl Counts {
 
 /// Stretches of a body, as e = λ² − 1, and those of the fitted law.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Stretches {
+pub struct BodyStretches {
     /// Stretches [λ_low, λ_high] that the fitted law covers.
     pub fitted: [f64; 2],
     /// Stretches observed so far.
@@ -80,9 +80,9 @@ pub struct Stretches {
     pub(super) tangent: f64,
 }
 
-impl Stretches {
+impl BodyStretches {
     /// Records observed stretches.
-    pub(super) fn see(&mut self, observed: StretchRange) {
+    pub(super) fn observe(&mut self, observed: StretchRange) {
         self.observed = self.observed.join(observed);
     }
 
@@ -106,7 +106,7 @@ impl Stretches {
     }
 }
 
-impl Default for Stretches {
+impl Default for BodyStretches {
     fn default() -> Self {
         Self {
             fitted: [0.95, 1.05],
@@ -119,7 +119,7 @@ impl Default for Stretches {
 
 /// Forces out of balance over their reference.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Convergence {
+pub struct ForceResiduals {
     /// Residual of the last iteration.
     pub residual: f64,
     /// Greatest reference force of an equilibrium.
@@ -143,9 +143,9 @@ pub(super) struct ContactState<const D: usize> {
     /// Displacement at the start of the load step, with friction between equilibria.
     pub start: Option<Field<D>>,
     /// Friction after the last step.
-    pub grips: Vec<Grip>,
+    pub grips: Vec<FrictionPair>,
     /// Active friction in the search for the current equilibrium, and its number of renewals in this step.
-    pub active: Vec<Grip>,
+    pub active: Vec<FrictionPair>,
     pub renewals: u32,
 }
 
@@ -159,8 +159,8 @@ impl<const D: usize> State<D> {
             force,
             step: 0,
             counts: Counts::default(),
-            stretches: Stretches::default(),
-            convergence: Convergence::default(),
+            stretches: BodyStretches::default(),
+            convergence: ForceResiduals::default(),
             fracture: Fracture::default(),
             contact: ContactState::default(),
             control: StepControl::default(),

@@ -1,15 +1,15 @@
 //! The equations of a body: bonds, material, loads, contact.
 
 use super::criterion::Breaking;
+use super::force_scale::{Balance, ForceScale};
 use super::load::Loads;
-use super::record::Record;
-use super::scale::{Balance, Scale};
+use super::record::StepRecord;
 use super::state::State;
 use crate::bonds::{Bonds, StretchScan, not_finite};
-use crate::contact::{Contact, ContactSummary, Grip, Plane, PlaneReaction};
+use crate::contact::{Contact, ContactSummary, FrictionPair, PlaneReaction, RigidPlane};
 use crate::error::Error;
 use crate::field::Field;
-use crate::material::{Material, Response};
+use crate::material::{Material, SolverMaterial};
 use crate::potential::StretchRange;
 use std::borrow::Cow;
 
@@ -23,7 +23,7 @@ pub struct System<'a, const D: usize> {
     /// Bonds; the solver sets their law.
     pub bonds: &'a mut dyn Bonds<D>,
     /// Material in these bonds.
-    pub(super) material: Box<dyn Response<D> + 'a>,
+    pub(super) material: Box<dyn SolverMaterial<D> + 'a>,
     /// Loads at factor 1. Particles without bonds lose their body forces.
     pub loads: Cow<'a, Loads<D>>,
     /// Load factor at the end of each step.
@@ -45,18 +45,18 @@ pub struct System<'a, const D: usize> {
     /// Stretches of the last check.
     pub(super) seen_stretches: StretchScan,
     /// Reference scale of out-of-balance forces.
-    pub(super) scale: Scale,
+    pub(super) scale: ForceScale,
     /// Load factor and its rate over the time, s, in explicit dynamics, instead of the ramp.
     pub course: Option<&'a LoadCurve<'a>>,
-    /// Values recorded in every row of the history, see [`Record::seen`](super::Record::seen).
-    pub observer: Option<&'a Observer<'a, D>>,
+    /// Values recorded in every row of the history, see [`StepRecord::seen`](super::Record::seen).
+    pub observer: Option<&'a StateObserver<'a, D>>,
 }
 
 /// Load factor and its rate, 1/s, at a time, s.
 pub type LoadCurve<'a> = dyn Fn(f64) -> (f64, f64) + Sync + 'a;
 
 /// Values of a body in a state, for its history.
-pub type Observer<'a, const D: usize> = dyn Fn(&dyn Bonds<D>, &State<D>) -> Vec<f64> + Sync + 'a;
+pub type StateObserver<'a, const D: usize> = dyn Fn(&dyn Bonds<D>, &State<D>) -> Vec<f64> + Sync + 'a;
 
 impl<'a, const D: usize> System<'a, D> {
     /// Creates the system of a body whose bonds do not break.
@@ -73,7 +73,7 @@ impl<'a, const D: usize> System<'a, D> {
     /// Creates the system as [`Self::new`] does, from a material already prepared for solvers.
     pub fn of_response(
         bonds: &'a mut dyn Bonds<D>,
-        material: Box<dyn Response<D> + 'a>,
+        material: Box<dyn SolverMaterial<D> + 'a>,
         loads: &'a Loads<D>,
         factors: &'a [f64],
     ) -> Self {
@@ -89,7 +89,7 @@ impl<'a, const D: usize> System<'a, D> {
             fit_bound: 1e-9,
             contact: None,
             seen_stretches: StretchScan::default(),
-            scale: Scale::default(),
+            scale: ForceScale::default(),
             course: None,
             observer: None,
         }
@@ -107,9 +107,9 @@ impl<'a, const D: usize> System<'a, D> {
     }
 
     /// Moves rigid planes to their positions at a load factor and a time, s.
-    pub(super) fn place(&mut self, factor: f64, time: f64) {
+    pub(super) fn move_planes(&mut self, factor: f64, time: f64) {
         if let Some(contact) = &mut self.contact {
-            contact.place(factor, time);
+            contact.move_planes(factor, time);
         }
     }
 
@@ -119,23 +119,27 @@ impl<'a, const D: usize> System<'a, D> {
         let before = state.step.checked_sub(1).map_or(0.0, |before| self.factors[before]);
         let after = self.factors[state.step];
         self.set_rates(after, after);
-        self.place(before, 0.0);
-        self.place(after, 0.0);
+        self.move_planes(before, 0.0);
+        self.move_planes(after, 0.0);
         if let Some(start) = &state.contact.start
-            && let Some(contact) = self.contact.as_mut().filter(|contact| contact.rubs())
+            && let Some(contact) = self.contact.as_mut().filter(|contact| contact.has_friction())
         {
-            contact.hold(start, state.contact.active.clone());
+            contact.begin_friction(start, state.contact.active.clone());
         }
     }
 
     /// Renews the normal forces of friction in an equilibrium; returns true if they have changed by more than
     /// `tolerance` of their sum, so that another equilibrium must be sought.
     pub(super) fn renew_friction(&mut self, state: &mut State<D>, tolerance: f64) -> bool {
-        let Some(contact) = self.contact.as_mut().filter(|contact| contact.rubs()) else { return false };
+        let Some(contact) = self.contact.as_mut().filter(|contact| contact.has_friction()) else {
+            return false;
+        };
         let Some(start) = &state.contact.start else { return false };
         let mut new = contact.grips(&*self.bonds, &state.displacement, start, &state.contact.grips);
-        let bound = |grips: &[Grip], pair| {
-            grips.binary_search_by_key(&pair, |grip: &Grip| grip.pair).map_or(0.0, |at| grips[at].bound)
+        let bound = |grips: &[FrictionPair], pair| {
+            grips
+                .binary_search_by_key(&pair, |grip: &FrictionPair| grip.pair)
+                .map_or(0.0, |at| grips[at].bound)
         };
         let lost =
             state.contact.active.iter().filter(|grip| bound(&new, grip.pair) == 0.0).map(|grip| grip.bound);
@@ -153,24 +157,24 @@ impl<'a, const D: usize> System<'a, D> {
             new.iter_mut()
                 .for_each(|grip| grip.bound = 0.5 * (grip.bound + bound(&state.contact.active, grip.pair)));
         }
-        contact.hold(start, new.clone());
+        contact.begin_friction(start, new.clone());
         (state.contact.active, state.contact.renewals) = (new, state.contact.renewals + 1);
         true
     }
 
     /// Contact, if it has friction.
     pub(super) fn friction(&self) -> Option<&Contact<D>> {
-        self.contact.as_ref().filter(|contact| contact.rubs())
+        self.contact.as_ref().filter(|contact| contact.has_friction())
     }
 
     /// Conjugate sums of loads and rigid planes, see [`Loads::conjugates`].
     pub(super) fn conjugates(&self, state: &State<D>) -> (f64, f64) {
         let (pull, push) = self.loads.conjugates(&*self.bonds, &state.displacement, &state.force);
-        let work = |(plane, resting): (&Plane<D>, &PlaneReaction)| {
+        let work = |(plane, resting): (&RigidPlane<D>, &PlaneReaction)| {
             (0..D).map(|d| plane.displacement[d] * resting.force[d]).sum::<f64>()
         };
         let Some(contact) = self.repulsion() else { return (pull, push) };
-        let resting = self.resting(state);
+        let resting = self.plane_reactions(state);
         (pull + contact.planes().zip(&resting).map(work).sum::<f64>(), push)
     }
 
@@ -182,9 +186,9 @@ impl<'a, const D: usize> System<'a, D> {
     }
 
     /// Contact of the body with each rigid plane, including friction.
-    pub(super) fn resting(&self, state: &State<D>) -> Vec<PlaneReaction> {
+    pub(super) fn plane_reactions(&self, state: &State<D>) -> Vec<PlaneReaction> {
         let Some(contact) = self.repulsion() else { return Vec::new() };
-        let mut resting = contact.resting(&state.displacement);
+        let mut resting = contact.plane_reactions(&state.displacement);
         for (resting, rub) in resting.iter_mut().zip(&state.contact.plane_friction) {
             (0..3).for_each(|d| resting.force[d] += rub[d]);
         }
@@ -198,7 +202,7 @@ impl<'a, const D: usize> System<'a, D> {
     pub(super) fn check_overlaps(&self, state: &State<D>) -> Result<(), Error> {
         let Some(contact) = self.repulsion() else { return Ok(()) };
         let allowed = 0.5 * self.bonds.spacing();
-        let resting = contact.resting(&state.displacement);
+        let resting = contact.plane_reactions(&state.displacement);
         let planes = contact.planes().zip(resting).enumerate();
         for (number, (plane, resting)) in planes.filter(|(_, (plane, _))| !plane.bonded) {
             if resting.gap < -allowed && plane.stiffness > 0.0 {
@@ -232,12 +236,12 @@ impl<'a, const D: usize> System<'a, D> {
     }
 
     /// Contacts in a state, if they are tracked.
-    pub(super) fn touching(&mut self, state: &State<D>) -> Option<ContactSummary> {
+    pub(super) fn contact_summary(&mut self, state: &State<D>) -> Option<ContactSummary> {
         let contact = self.contact.as_mut()?;
         if !contact.has_pairs() {
             contact.rebuild(&*self.bonds, &state.displacement);
         }
-        Some(contact.touching(&*self.bonds, &state.displacement))
+        Some(contact.summary(&*self.bonds, &state.displacement))
     }
 
     /// Computes the force densities of whole pieces from the site `start` on, without loads: of the material,
@@ -264,7 +268,7 @@ impl<'a, const D: usize> System<'a, D> {
     pub fn stored_energy(&mut self, state: &State<D>, observed: StretchRange) -> f64 {
         let bonds = self.material.energy(&*self.bonds, &state.displacement, observed);
         match self.repulsion() {
-            Some(contact) => bonds + contact.touching(&*self.bonds, &state.displacement).energy,
+            Some(contact) => bonds + contact.summary(&*self.bonds, &state.displacement).energy,
             None => bonds,
         }
     }
@@ -289,9 +293,9 @@ impl<'a, const D: usize> System<'a, D> {
         [factor, pull, push]: [f64; 3],
         observed: StretchRange,
         stored: f64,
-    ) -> Record {
+    ) -> StepRecord {
         let (load, displacement) = self.response(factor, (pull, push));
-        Record {
+        StepRecord {
             factor,
             load,
             displacement,
@@ -303,7 +307,7 @@ impl<'a, const D: usize> System<'a, D> {
             detached: state.fracture.detached,
             stored,
             balance: Balance::default(),
-            contact: self.touching(state),
+            contact: self.contact_summary(state),
             work: state.work,
             released: state.fracture.released,
             smallest_stretch: (1.0 + observed.low).max(0.0).sqrt(),
@@ -312,7 +316,7 @@ impl<'a, const D: usize> System<'a, D> {
             kinetic: state.motion.energies.kinetic,
             damped: state.motion.energies.damped,
             rubbed: state.motion.energies.rubbed,
-            resting: self.resting(state),
+            resting: self.plane_reactions(state),
             seen: self.seen(state),
         }
     }

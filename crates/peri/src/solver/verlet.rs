@@ -6,14 +6,16 @@
 //! doi:10.1017/S0962492902000144. Works are sums of ½(force before + force after)·Δu, which change ½ρ(v² −
 //! ¼Δt²a²) exactly: the energies balance to O(Δt²) without drift.
 
-use super::method::{Finished, Method, Watch};
-use super::motion::{BondSums, Energies, Motion, StepLimits, StretchLook};
+use super::method::{Method, StepCallback, Watch};
+use super::motion::{BondSums, DynamicEnergies, Motion, StepLimits, StretchLook};
 use super::record::Status;
 use super::state::State;
 use super::system::System;
 use super::time_step::{critical, largest_frequency_squared};
 use super::verlet_friction::{friction_pass, plane_pass};
-use super::verlet_step::{Sums, VerletStep, force_pass, kick_pass, leap_pass, refresh, stored, volumes};
+use super::verlet_step::{
+    VerletStep, VerletSums, force_pass, kick_pass, leap_pass, refresh, stored, volumes,
+};
 use crate::bonds::{StretchRange, stretch_range};
 use crate::contact::Contact;
 use crate::error::Error;
@@ -24,7 +26,7 @@ use crate::error::Error;
 const EXCESS: f64 = 0.25;
 /// Steps at the start in which the work of a ramped load is too small for that fraction: the kinetic energy
 /// exceeds the work by (3/n²)·¼ after n steps.
-const LENIENT: u64 = 8;
+const EARLY_STEPS: u64 = 8;
 
 /// Contact stiffness in the limits over that observed, so that the time step is not shortened for each
 /// additional particle.
@@ -82,18 +84,18 @@ impl<const D: usize> Method<D> for VelocityVerlet {
         system: &mut System<D>,
         state: &mut State<D>,
         watch: &mut Watch<D>,
-        finished: &mut Finished<D>,
+        finished: &mut StepCallback<D>,
     ) -> Result<(), Error> {
         self.check()?;
         if !state.motion.begun && system.course.is_none() {
             system.refuse_inverted(&[1.0])?;
         }
         let volumes = volumes(system);
-        system.contact.iter_mut().for_each(Contact::release);
+        system.contact.iter_mut().for_each(Contact::end_friction);
         if state.motion.begun {
-            system.place(self.factor(system, state.motion.time).0, state.motion.time);
+            system.move_planes(self.factor(system, state.motion.time).0, state.motion.time);
             system.restore(state)?;
-            system.contact.iter_mut().for_each(|contact| contact.resume(&state.contact.grips));
+            system.contact.iter_mut().for_each(|contact| contact.resume_friction(&state.contact.grips));
         } else {
             self.begin(system, state, &volumes)?;
         }
@@ -157,7 +159,7 @@ impl VelocityVerlet {
         volumes: &[f64],
     ) -> Result<(), Error> {
         let (factor, rate) = self.factor(system, 0.0);
-        system.place(factor, 0.0);
+        system.move_planes(factor, 0.0);
         system.set_rates(factor, factor);
         (state.contact.friction, state.contact.start) = (None, None);
         (state.contact.plane_friction, state.contact.plane_push) = (Vec::new(), Vec::new());
@@ -200,23 +202,23 @@ impl VelocityVerlet {
         });
         let limits =
             StepLimits { critical_step: critical(frequency), contact, bonds, ..StepLimits::default() };
-        let energies = Energies { kinetic, turnover: state.work, ..Energies::default() };
+        let energies = DynamicEnergies { kinetic, turnover: state.work, ..DynamicEnergies::default() };
         state.motion = Motion { begun: true, limits, energies, ..Motion::default() };
         if let Some(found) = self.time_step.filter(|&found| found > state.motion.limits.critical_step) {
             return Err(Error::TimeStep { found, critical: state.motion.limits.critical_step });
         }
         state.motion.look = StretchLook::new(observed);
-        self.know(system, state, frequency);
+        self.record_frequency(system, state, frequency);
         self.cover(system, state);
         let rest = VerletStep { step: 0.0, density: self.density, damping: 0.0, factors: [factor; 2], rate };
         friction_pass(system, state, volumes, &rest, None);
         plane_pass(system, state, &[]);
-        self.sever(system, state, observed, factor);
+        self.break_overstretched(system, state, observed, factor);
         Ok(())
     }
 
     /// Records the sharp frequency of the present stretches in units of the law's tangent there.
-    fn know<const D: usize>(&self, system: &mut System<D>, state: &mut State<D>, frequency: f64) {
+    fn record_frequency<const D: usize>(&self, system: &mut System<D>, state: &mut State<D>, frequency: f64) {
         let tangent = system.material.range(state.motion.look.stretches).least_tangent;
         state.motion.limits.frequency = if frequency > 0.0 { frequency / tangent } else { 0.0 };
         if system.material.has_points() {
@@ -284,7 +286,7 @@ impl VelocityVerlet {
             // two ends, √D components
             let strain = 2.0 * (D as f64).sqrt() * first.increment / state.motion.limits.bonds.shortest;
             state.motion.look.slack = slack + strain;
-            system.place(factor, after);
+            system.move_planes(factor, after);
             system.prepare(&state.displacement);
             let Some((displacement, velocity)) = &start else { break (after, leap, first) };
             cuts += 1;
@@ -294,7 +296,7 @@ impl VelocityVerlet {
             // a step whose end requires a shorter one is undone
             state.displacement.clone_from(displacement);
             state.velocity.clone_from(velocity);
-            system.place(before, state.motion.time);
+            system.move_planes(before, state.motion.time);
             state.motion.plan(end);
         };
         let factor = leap.factors[1];
@@ -307,7 +309,7 @@ impl VelocityVerlet {
         let (mut second, observed) = force_pass(system, state, volumes, &leap, look, !look && !rubs);
         system.count_evaluation(state);
         if look {
-            state.stretches.see(observed);
+            state.stretches.observe(observed);
             state.motion.look = StretchLook::new(observed);
             if state.stretches.observed.high.is_finite() && system.widen(state)? {
                 refresh(system, state, factor, None);
@@ -325,7 +327,7 @@ impl VelocityVerlet {
         motion.steps.taken += 1;
         state.counts.iterate();
         self.account(state, first, second)?;
-        let broken = look && self.sever(system, state, observed, factor);
+        let broken = look && self.break_overstretched(system, state, observed, factor);
         self.cover_contact(system, state);
         let follows = self.follows(system);
         if follows {
@@ -342,7 +344,12 @@ impl VelocityVerlet {
     }
 
     /// Updates the energies of a step and checks them.
-    fn account<const D: usize>(&self, state: &mut State<D>, first: Sums, second: Sums) -> Result<(), Error> {
+    fn account<const D: usize>(
+        &self,
+        state: &mut State<D>,
+        first: VerletSums,
+        second: VerletSums,
+    ) -> Result<(), Error> {
         let motion = &mut state.motion;
         motion.energies.kinetic = second.kinetic;
         motion.energies.damped += first.damped + second.damped;
@@ -351,7 +358,7 @@ impl VelocityVerlet {
         let available = state.work - gone - motion.energies.floor;
         motion.energies.turnover = motion.energies.turnover.max(available).max(gone);
         let most = available.max(0.0) + EXCESS * motion.energies.turnover;
-        let grown = motion.energies.kinetic > most && state.counts.total_iterations > LENIENT;
+        let grown = motion.energies.kinetic > most && state.counts.total_iterations > EARLY_STEPS;
         if grown || !motion.energies.kinetic.is_finite() || !available.is_finite() {
             return Err(Error::Unstable {
                 time: motion.time,
@@ -366,7 +373,7 @@ impl VelocityVerlet {
     }
 
     /// Breaks overstretched bonds and updates the forces; returns true if any broke.
-    fn sever<const D: usize>(
+    fn break_overstretched<const D: usize>(
         &self,
         system: &mut System<D>,
         state: &mut State<D>,

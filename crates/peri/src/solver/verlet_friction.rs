@@ -6,7 +6,7 @@
 
 use super::state::State;
 use super::system::System;
-use super::verlet_step::{Two, VerletStep};
+use super::verlet_step::{FieldPair, VerletStep};
 use crate::field::{Field, chunk_range};
 use polycore::numerics::ordered_sum;
 use rayon::prelude::*;
@@ -20,7 +20,7 @@ pub fn friction_pass<const D: usize>(
     leap: &VerletStep,
     old: Option<Field<D>>,
 ) {
-    let Some(contact) = system.contact.as_mut().filter(|contact| contact.rubs()) else { return };
+    let Some(contact) = system.contact.as_mut().filter(|contact| contact.has_friction()) else { return };
     let sites = volumes.len();
     // a body moving at the start slides to its limit in the first step
     let span = if leap.step > 0.0 { leap.step } else { state.motion.limits.longest };
@@ -42,7 +42,7 @@ pub fn friction_pass<const D: usize>(
         sum
     };
     let mut friction = old.unwrap_or_else(|| Field::zeros(sites));
-    let of = |(chunk, (mut own, total)): (usize, Two<D>)| {
+    let of = |(chunk, (mut own, total)): (usize, FieldPair<D>)| {
         let before = work(chunk, &own);
         own.iter_mut().for_each(|part| part.fill(0.0));
         contact.add_friction(chunk, &mut own);
@@ -70,7 +70,7 @@ pub fn plane_pass<const D: usize>(system: &System<D>, state: &mut State<D>, rubb
     if contact.planes().all(|plane| plane.displacement == [0.0; D] && plane.velocity == [0.0; D]) {
         return;
     }
-    let resting = contact.resting(&state.displacement);
+    let resting = contact.plane_reactions(&state.displacement);
     let pushing: Vec<[f64; 3]> = resting.iter().map(|plane| plane.force).collect();
     state.work += work_of_planes(contact.moved(), &state.contact.plane_push, &pushing)
         + work_of_planes(contact.moved(), rubbed, &state.contact.plane_friction);

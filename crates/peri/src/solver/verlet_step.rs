@@ -25,7 +25,7 @@ pub struct VerletStep {
 
 /// Sums over all sites, item by item in a fixed order.
 #[derive(Clone, Copy, Default, Debug)]
-pub struct Sums {
+pub struct VerletSums {
     /// Kinetic energy Σ ½ρV v², J (only after the whole step).
     pub kinetic: f64,
     /// Work of body forces and supports in this half, J.
@@ -36,7 +36,7 @@ pub struct Sums {
     pub increment: f64,
 }
 
-impl Sums {
+impl VerletSums {
     fn add(self, other: Self) -> Self {
         Self {
             kinetic: self.kinetic + other.kinetic,
@@ -49,10 +49,10 @@ impl Sums {
 
 /// Sites whose stretches are tracked together if bonds may break, a divisor of [`CHUNK`]: near a crack, few
 /// such ranges hold overstretched bonds, but many work items do.
-const LOOK: usize = 256;
+const CHECKED_SITES: usize = 256;
 
 /// A work item of two fields.
-pub type Two<'a, const D: usize> = ([&'a mut [f64]; D], [&'a mut [f64]; D]);
+pub type FieldPair<'a, const D: usize> = ([&'a mut [f64]; D], [&'a mut [f64]; D]);
 
 /// Updates v ← v + ½Δt a and u ← u + Δt v; constrained components go to F d.
 pub fn leap_pass<const D: usize>(
@@ -60,16 +60,16 @@ pub fn leap_pass<const D: usize>(
     state: &mut State<D>,
     volumes: &[f64],
     leap: &VerletStep,
-) -> Sums {
+) -> VerletSums {
     let force = state.force.components();
     let keep = 1.0 - 0.5 * leap.damping * leap.step;
     let push = 0.5 * leap.step / leap.density;
     let (displacement, velocity) = (state.displacement.chunks_mut(), state.velocity.chunks_mut());
-    let of = |(chunk, (u, v)): (usize, Two<D>)| {
+    let of = |(chunk, (u, v)): (usize, FieldPair<D>)| {
         let range = chunk_range(chunk, volumes.len());
-        let mut sums = Sums::default();
+        let mut sums = VerletSums::default();
         for d in 0..D {
-            let at = Place::new(loads, volumes, range.clone(), d);
+            let at = AxisLoads::new(loads, volumes, range.clone(), d);
             let (u, v, f) = (&mut *u[d], &mut *v[d], &force[d][range.clone()]);
             if at.is_plain(leap) {
                 sums.increment = sums.increment.max(leap.step * free_leap(u, v, f, keep, push, leap.step));
@@ -95,8 +95,8 @@ pub fn leap_pass<const D: usize>(
         }
         sums
     };
-    let parts: Vec<Sums> = displacement.into_par_iter().zip(velocity).enumerate().map(of).collect();
-    parts.into_iter().fold(Sums::default(), Sums::add)
+    let parts: Vec<VerletSums> = displacement.into_par_iter().zip(velocity).enumerate().map(of).collect();
+    parts.into_iter().fold(VerletSums::default(), VerletSums::add)
 }
 
 /// Computes new forces and, if it `kicks`, the second half of the kick in the same pass; not if stretches are
@@ -108,11 +108,11 @@ pub fn force_pass<const D: usize>(
     leap: &VerletStep,
     look: bool,
     kicks: bool,
-) -> (Sums, StretchRange) {
+) -> (VerletSums, StretchRange) {
     let (loads, displacement, body) = (&*system.loads, &state.displacement, &*system);
     let (force, velocity) = (state.force.chunks_mut(), state.velocity.chunks_mut());
-    let part = if look { body.piece().max(LOOK) } else { CHUNK };
-    let of = |(chunk, (mut f, mut v)): (usize, Two<D>)| {
+    let part = if look { body.piece().max(CHECKED_SITES) } else { CHUNK };
+    let of = |(chunk, (mut f, mut v)): (usize, FieldPair<D>)| {
         let (start, length) = (chunk * CHUNK, f[0].len());
         let mut seen = Vec::new();
         for from in (0..length).step_by(part) {
@@ -123,14 +123,14 @@ pub fn force_pass<const D: usize>(
         }
         load(loads, start, leap.factors[1], &mut f);
         let f = f.map(|f| &*f);
-        (if kicks { kick(loads, volumes, leap, chunk, f, &mut v) } else { Sums::default() }, seen)
+        (if kicks { kick(loads, volumes, leap, chunk, f, &mut v) } else { VerletSums::default() }, seen)
     };
-    let (sums, seen): (Vec<Sums>, Vec<Vec<StretchRange>>) =
+    let (sums, seen): (Vec<VerletSums>, Vec<Vec<StretchRange>>) =
         force.into_par_iter().zip(velocity).enumerate().map(of).unzip();
     let seen = StretchScan { part, ranges: seen.concat() };
     let observed = seen.ranges.iter().copied().fold(StretchRange::REST, StretchRange::join);
     system.seen_stretches = seen;
-    (sums.into_iter().fold(Sums::default(), Sums::add), observed)
+    (sums.into_iter().fold(VerletSums::default(), VerletSums::add), observed)
 }
 
 /// Runs the second half of the kick: v ← v + ½Δt a with the new a; constrained components have the rate of F
@@ -140,15 +140,15 @@ pub fn kick_pass<const D: usize>(
     state: &mut State<D>,
     volumes: &[f64],
     leap: &VerletStep,
-) -> Sums {
+) -> VerletSums {
     let force = state.force.components();
     let velocity = state.velocity.chunks_mut();
     let of = |(chunk, mut v): (usize, [&mut [f64]; D])| {
         let range = chunk_range(chunk, volumes.len());
         kick(loads, volumes, leap, chunk, force.map(|f| &f[range.clone()]), &mut v)
     };
-    let parts: Vec<Sums> = velocity.into_par_iter().enumerate().map(of).collect();
-    parts.into_iter().fold(Sums::default(), Sums::add)
+    let parts: Vec<VerletSums> = velocity.into_par_iter().enumerate().map(of).collect();
+    parts.into_iter().fold(VerletSums::default(), VerletSums::add)
 }
 
 /// Computes forces with loads and present friction, of some sites and their neighbours, or of all; bonds of
@@ -206,15 +206,15 @@ fn kick<const D: usize>(
     chunk: usize,
     force: [&[f64]; D],
     velocity: &mut [&mut [f64]; D],
-) -> Sums {
+) -> VerletSums {
     let range = chunk_range(chunk, volumes.len());
     let push = 0.5 * leap.step / leap.density;
     let keep = 1.0 / (1.0 + 0.5 * leap.damping * leap.step);
     let [before, after] = leap.factors;
-    let mut sums = Sums::default();
+    let mut sums = VerletSums::default();
     let mut square = 0.0;
     for d in 0..D {
-        let at = Place::new(loads, volumes, range.clone(), d);
+        let at = AxisLoads::new(loads, volumes, range.clone(), d);
         let (v, f) = (&mut *velocity[d], force[d]);
         if at.is_plain(leap) {
             square += free_kick(v, f, at.volumes, push);
@@ -244,7 +244,7 @@ fn kick<const D: usize>(
 }
 
 /// The loads on one axis of a work item.
-struct Place<'a> {
+struct AxisLoads<'a> {
     constrained: &'a [u8],
     bit: usize,
     prescribed: &'a [f64],
@@ -252,7 +252,7 @@ struct Place<'a> {
     volumes: &'a [f64],
 }
 
-impl<'a> Place<'a> {
+impl<'a> AxisLoads<'a> {
     fn new<const D: usize>(
         loads: &'a Loads<D>,
         volumes: &'a [f64],

@@ -1,7 +1,7 @@
 //! Bonds of one offset, distributed over the sites whose windows they cross: sums with fixed weights, a block
 //! of sites at a time.
 
-use super::Tensor;
+use super::StressTensor;
 use crate::bonds::TILE;
 use crate::field::CHUNK;
 use pulp::{Arch, Simd, WithSimd};
@@ -36,22 +36,22 @@ pub struct Tap {
 
 /// Taps of which each reads the vectors of the previous one from the second on: the contents of V + N − 1
 /// vectors serve N taps.
-struct Run {
+struct TapRun {
     /// Shift of the first tap.
     shift: isize,
     weights: [f64; RUN],
 }
 
 /// Taps grouped in runs of one, two, … [`RUN`].
-type Runs = [Vec<Run>; RUN];
+type TapRuns = [Vec<TapRun>; RUN];
 
 /// Groups the taps of a bond in runs, with `width` numbers per vector and `lanes` per site.
-fn runs(taps: &[Tap], width: usize, lanes: usize) -> Runs {
+fn runs(taps: &[Tap], width: usize, lanes: usize) -> TapRuns {
     // vectors smaller than a site do not overlap like this
     let (ahead, most) = if width < lanes { (1, 1) } else { ((width / lanes) as isize, RUN) };
     let mut left = BTreeMap::new();
     taps.iter().for_each(|tap| *left.entry(tap.shift).or_insert(0.0) += tap.weight);
-    let mut runs: Runs = Default::default();
+    let mut runs: TapRuns = Default::default();
     while let Some((shift, first)) = left.pop_first() {
         let (mut weights, mut count) = ([0.0; RUN], 1);
         weights[0] = first;
@@ -61,7 +61,7 @@ fn runs(taps: &[Tap], width: usize, lanes: usize) -> Runs {
             weights[count] = weight;
             count += 1;
         }
-        runs[count - 1].push(Run { shift, weights });
+        runs[count - 1].push(TapRun { shift, weights });
     }
     runs
 }
@@ -106,7 +106,7 @@ impl Aligned {
 }
 
 /// Bonds of one offset from every site.
-pub struct Shared<const D: usize> {
+pub struct OffsetBonds<const D: usize> {
     sites: usize,
     /// Number of zeros before and behind the sites: whole chunks.
     margin: usize,
@@ -120,7 +120,7 @@ pub struct Shared<const D: usize> {
     shift: isize,
 }
 
-impl<const D: usize> Shared<D> {
+impl<const D: usize> OffsetBonds<D> {
     /// Allocates storage without bonds. No tap reaches farther than `reach` sites, no bond farther than
     /// `bond`.
     pub fn new(occupied: &[bool], filled: Vec<bool>, reach: usize, bond: usize) -> Self {
@@ -154,23 +154,23 @@ impl<const D: usize> Shared<D> {
     }
 
     /// Adds the bonds' averages by a measure's taps ⊗ edge to its sums.
-    pub fn add(&self, taps: &[Tap], edge: [f64; D], to: &mut Shares<D>) {
+    pub fn add(&self, taps: &[Tap], edge: [f64; D], to: &mut ShareSums<D>) {
         let arch = Arch::new();
         let width = arch.dispatch(Width);
         let apart = D == lanes::<D>() && to.rim.contains(&true);
         let runs =
-            [runs(taps, width, lanes::<D>()), if apart { runs(taps, width, 1) } else { Runs::default() }];
-        let Shares { sums, completed, rim } = to;
+            [runs(taps, width, lanes::<D>()), if apart { runs(taps, width, 1) } else { TapRuns::default() }];
+        let ShareSums { sums, completed, rim } = to;
         let sums = &mut sums.get_mut()[..self.sites.next_multiple_of(CHUNK) * lanes::<D>() * D];
         sums.par_chunks_mut(CHUNK * lanes::<D>() * D).enumerate().for_each(|(chunk, sums)| {
             let start = chunk * CHUNK;
-            arch.dispatch(Chunk { shared: self, runs: &runs, completed, rim, start, edge, sums });
+            arch.dispatch(ConvolutionChunk { shared: self, runs: &runs, completed, rim, start, edge, sums });
         });
     }
 }
 
 /// Sums of a measure, site by site.
-pub struct Shares<const D: usize> {
+pub struct ShareSums<const D: usize> {
     /// Block by block, for each component of the edge [`lanes`] numbers per site.
     sums: Aligned,
     /// 1 in sites whose averages are divided by the weights of the bonds whose two particles exist; and their
@@ -179,7 +179,7 @@ pub struct Shares<const D: usize> {
     rim: Vec<bool>,
 }
 
-impl<const D: usize> Shares<D> {
+impl<const D: usize> ShareSums<D> {
     /// Allocates zero sums; `rim` are the sites whose averages are completed.
     pub fn new(sites: usize, rim: &[u32]) -> Self {
         let stored = sites.next_multiple_of(CHUNK);
@@ -189,18 +189,18 @@ impl<const D: usize> Shares<D> {
     }
 
     /// The sum of a site.
-    pub fn get(&self, site: usize) -> Tensor<D> {
+    pub fn get(&self, site: usize) -> StressTensor<D> {
         let (block, site) = (site / sites_of_block::<D>(), site % sites_of_block::<D>());
         let sums = &self.sums.get()[block * BLOCK * D..];
         std::array::from_fn(|a| std::array::from_fn(|b| sums[b * BLOCK + site * lanes::<D>() + a]))
     }
 }
 
-/// Runs [`Shared::add`] over a chunk.
-struct Chunk<'a, const D: usize> {
-    shared: &'a Shared<D>,
+/// Runs [`OffsetBonds::add`] over a chunk.
+struct ConvolutionChunk<'a, const D: usize> {
+    shared: &'a OffsetBonds<D>,
     /// Taps for the numbers of the bonds, and in a plane for their existence.
-    runs: &'a [Runs; 2],
+    runs: &'a [TapRuns; 2],
     completed: &'a [bool],
     rim: &'a [bool],
     start: usize,
@@ -208,7 +208,7 @@ struct Chunk<'a, const D: usize> {
     sums: &'a mut [f64],
 }
 
-impl<const D: usize> WithSimd for Chunk<'_, D> {
+impl<const D: usize> WithSimd for ConvolutionChunk<'_, D> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
@@ -245,12 +245,12 @@ impl<const D: usize> WithSimd for Chunk<'_, D> {
     }
 }
 
-impl<const D: usize> Chunk<'_, D> {
+impl<const D: usize> ConvolutionChunk<'_, D> {
     /// Σ weight·number over the taps, V vectors at a time.
     #[inline(always)]
     fn average<S: Simd, const V: usize>(&self, simd: S, start: usize, averages: &mut [f64; BLOCK]) {
         let (lanes, width) = (lanes::<D>(), V * S::F64_LANES);
-        let source = Source { numbers: self.shared.forces.get(), lanes, bond: 0 };
+        let source = TapSource { numbers: self.shared.forces.get(), lanes, bond: 0 };
         for part in 0..BLOCK / width {
             let here = (self.shared.margin + start) * lanes + part * width;
             let sums = source.total::<S, V, false>(simd, &self.runs[0], here);
@@ -287,8 +287,8 @@ impl<const D: usize> Chunk<'_, D> {
     /// Computes the weights of the bonds whose two particles exist, V vectors at a time.
     #[inline(always)]
     fn existing<S: Simd, const V: usize>(&self, simd: S, start: usize, weights: &mut [f64]) {
-        let Shared { occupied, shift, margin, .. } = self.shared;
-        let (source, width) = (Source { numbers: occupied, lanes: 1, bond: *shift }, V * S::F64_LANES);
+        let OffsetBonds { occupied, shift, margin, .. } = self.shared;
+        let (source, width) = (TapSource { numbers: occupied, lanes: 1, bond: *shift }, V * S::F64_LANES);
         for part in 0..weights.len() / width {
             let sums = source.total::<S, V, true>(simd, &self.runs[1], margin + start + part * width);
             let out = &mut S::as_mut_simd_f64s(&mut weights[part * width..][..width]).0[..V];
@@ -301,7 +301,7 @@ impl<const D: usize> Chunk<'_, D> {
 }
 
 /// Numbers weighted by taps, or the products of those at a bond's two ends.
-struct Source<'a> {
+struct TapSource<'a> {
     numbers: &'a [f64],
     /// Numbers per site.
     lanes: usize,
@@ -309,13 +309,13 @@ struct Source<'a> {
     bond: isize,
 }
 
-impl Source<'_> {
+impl TapSource<'_> {
     /// Sums over all taps of V vectors from the number `here` on.
     #[inline(always)]
     fn total<S: Simd, const V: usize, const ENDS: bool>(
         &self,
         simd: S,
-        runs: &Runs,
+        runs: &TapRuns,
         here: usize,
     ) -> [S::f64s; V] {
         let mut sums = [simd.splat_f64s(0.0); V];
@@ -332,7 +332,7 @@ impl Source<'_> {
     fn sum<S: Simd, const V: usize, const N: usize, const ENDS: bool>(
         &self,
         simd: S,
-        runs: &Runs,
+        runs: &TapRuns,
         here: usize,
         mut sums: [S::f64s; V],
     ) -> [S::f64s; V] {

@@ -1,45 +1,49 @@
 //! Stress on a lattice, where the bond function depends on offsets only: each measure is, bond by bond of the
 //! stencil, a convolution of that bond's forces with fixed weights. The forces are the same for all measures.
 
-use super::convolution::{Shared, Shares, Tap, tiles};
-use super::pull::forces;
-use super::window::{Averaged, Window, normalise};
-use super::{BallVolume, Loaded, Measure, Measured, ball_volume, cell_fractions, segment_fraction};
+use super::bond_forces::forces;
+use super::convolution::{OffsetBonds, ShareSums, Tap, tiles};
+use super::window::{AveragedWindow, StressWindow, normalise};
+use super::{
+    BallVolume, MeasuredStress, StressInput, StressMethod, ball_volume, cell_fractions, segment_fraction,
+};
 use crate::bonds::{BodyGeometry, LatticeBonds};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::time::Instant;
 
 /// Sums of a measure, and their run time.
-struct Sums<const D: usize> {
-    measure: Measure,
-    window: Option<Averaged<D>>,
+struct StressSums<const D: usize> {
+    measure: StressMethod,
+    window: Option<AveragedWindow<D>>,
     /// Taps of each bond of half the stencil.
     taps: Vec<Vec<Tap>>,
-    shares: Shares<D>,
+    shares: ShareSums<D>,
     seconds: f64,
 }
 
-impl<const D: usize> Sums<D> {
-    fn new(bonds: &LatticeBonds<D>, state: &Loaded<D>, measure: Measure) -> Self {
+impl<const D: usize> StressSums<D> {
+    fn new(bonds: &LatticeBonds<D>, state: &StressInput<D>, measure: StressMethod) -> Self {
         let started = Instant::now();
-        let window = measure.is_partition().then(|| Averaged::<D>::new(Window::of(measure), bonds.ratio()));
+        let window = measure
+            .is_partition()
+            .then(|| AveragedWindow::<D>::new(StressWindow::for_measure(measure), bonds.ratio()));
         let mut alike = BTreeMap::new();
         let half = half(bonds).iter();
         let taps = half.map(|&offset| taps(bonds, offset, measure, window.as_ref(), &mut alike)).collect();
-        let shares = Shares::new(bonds.sites(), &rim(bonds, state, measure));
+        let shares = ShareSums::new(bonds.sites(), &rim(bonds, state, measure));
         Self { measure, window, taps, shares, seconds: started.elapsed().as_secs_f64() }
     }
 
     /// Divides the sums by the volumes.
-    fn finish(self, bonds: &LatticeBonds<D>, state: &Loaded<D>, ball: BallVolume) -> Measured<D> {
+    fn finish(self, bonds: &LatticeBonds<D>, state: &StressInput<D>, ball: BallVolume) -> MeasuredStress<D> {
         let started = Instant::now();
         let volumes = volumes(bonds, state, self.measure, ball, self.window.as_ref());
         let one = |(&site, volume): (&u32, f64)| {
             self.shares.get(site as usize).map(|row| row.map(|sum| sum / volume))
         };
         let piola = bonds.particles().par_iter().zip(volumes).map(one).collect();
-        Measured { piola, seconds: self.seconds + started.elapsed().as_secs_f64() }
+        MeasuredStress { piola, seconds: self.seconds + started.elapsed().as_secs_f64() }
     }
 }
 
@@ -52,17 +56,18 @@ fn half<const D: usize>(bonds: &LatticeBonds<D>) -> &[[i32; D]] {
 
 pub fn piolas<const D: usize>(
     bonds: &LatticeBonds<D>,
-    state: &Loaded<D>,
-    measures: &[Measure],
+    state: &StressInput<D>,
+    measures: &[StressMethod],
     ball: BallVolume,
-) -> Vec<Measured<D>> {
-    let mut all: Vec<Sums<D>> = measures.iter().map(|&measure| Sums::new(bonds, state, measure)).collect();
+) -> Vec<MeasuredStress<D>> {
+    let mut all: Vec<StressSums<D>> =
+        measures.iter().map(|&measure| StressSums::new(bonds, state, measure)).collect();
     let started = Instant::now();
     let reach = all.iter().flat_map(|sums| sums.taps.iter().flatten()).map(|tap| tap.shift.unsigned_abs());
     let longest = half(bonds).iter().map(|&offset| bonds.shift(offset).unsigned_abs());
     let (reach, longest) = (reach.max().unwrap_or(0), longest.max().unwrap_or(0));
     let filled = tiles(bonds.sites(), bonds.particles());
-    let mut shared = Shared::new(&bonds.occupancy(), filled, reach, longest);
+    let mut shared = OffsetBonds::new(&bonds.occupancy(), filled, reach, longest);
     let mut seconds = started.elapsed().as_secs_f64();
     for (k, &offset) in half(bonds).iter().enumerate() {
         let started = Instant::now();
@@ -75,21 +80,21 @@ pub fn piolas<const D: usize>(
             sums.seconds += started.elapsed().as_secs_f64();
         }
     }
-    let finish = |sums: Sums<D>| {
+    let finish = |sums: StressSums<D>| {
         let measured = sums.finish(bonds, state, ball);
-        Measured { seconds: measured.seconds + seconds, ..measured }
+        MeasuredStress { seconds: measured.seconds + seconds, ..measured }
     };
     all.into_iter().map(finish).collect()
 }
 
 /// Bond functions of offsets that differ only in the order and signs of their components.
-type Alike<const D: usize> = BTreeMap<[i32; D], Vec<([i32; D], f64)>>;
+type EquivalentOffsets<const D: usize> = BTreeMap<[i32; D], Vec<([i32; D], f64)>>;
 
 /// Bond function of an offset, from that of the equivalent one with ascending, non-negative components.
 fn bond_function<const D: usize>(
-    window: &Averaged<D>,
+    window: &AveragedWindow<D>,
     offset: [i32; D],
-    alike: &mut Alike<D>,
+    alike: &mut EquivalentOffsets<D>,
 ) -> Vec<([i32; D], f64)> {
     let mut order: [usize; D] = std::array::from_fn(|d| d);
     order.sort_by_key(|&d| offset[d].abs());
@@ -111,13 +116,13 @@ fn bond_function<const D: usize>(
 fn taps<const D: usize>(
     bonds: &LatticeBonds<D>,
     offset: [i32; D],
-    measure: Measure,
-    window: Option<&Averaged<D>>,
-    alike: &mut Alike<D>,
+    measure: StressMethod,
+    window: Option<&AveragedWindow<D>>,
+    alike: &mut EquivalentOffsets<D>,
 ) -> Vec<Tap> {
     let weights = match (measure, window) {
-        (Measure::OnePoint, _) => vec![([0; D], 0.5), (offset.map(|o| -o), 0.5)],
-        (Measure::HardyScaled, _) => {
+        (StressMethod::OnePoint, _) => vec![([0; D], 0.5), (offset.map(|o| -o), 0.5)],
+        (StressMethod::HardyScaled, _) => {
             let mut weights = crossing(bonds.ratio(), offset, measure);
             normalise(&mut weights);
             weights
@@ -130,7 +135,7 @@ fn taps<const D: usize>(
 
 /// Start of bonds that cross the ball about a particle, and the fraction inside (as printed: ½ with both ends
 /// there).
-fn crossing<const D: usize>(ratio: f64, offset: [i32; D], measure: Measure) -> Vec<([i32; D], f64)> {
+fn crossing<const D: usize>(ratio: f64, offset: [i32; D], measure: StressMethod) -> Vec<([i32; D], f64)> {
     let square = ratio * ratio;
     let reach = 2 * ratio.ceil() as i32;
     let side = (2 * reach + 1) as usize;
@@ -141,8 +146,8 @@ fn crossing<const D: usize>(ratio: f64, offset: [i32; D], measure: Measure) -> V
             let q = std::array::from_fn(|d| p[d] + f64::from(offset[d]));
             let norm = |x: [f64; D]| x.iter().map(|c| c * c).sum::<f64>();
             let weight = match measure {
-                Measure::AsPublished if norm(p) < square && norm(q) < square => 0.5,
-                Measure::AsPublished => 0.0,
+                StressMethod::AsPublished if norm(p) < square && norm(q) < square => 0.5,
+                StressMethod::AsPublished => 0.0,
                 _ => segment_fraction(p, q, square),
             };
             (weight > 0.0).then_some((start, weight))
@@ -151,10 +156,10 @@ fn crossing<const D: usize>(ratio: f64, offset: [i32; D], measure: Measure) -> V
 }
 
 /// Sites near a surface whose windows lack bonds, if existing bonds compensate for them.
-fn rim<const D: usize>(bonds: &LatticeBonds<D>, state: &Loaded<D>, measure: Measure) -> Vec<u32> {
+fn rim<const D: usize>(bonds: &LatticeBonds<D>, state: &StressInput<D>, measure: StressMethod) -> Vec<u32> {
     let wanted = |site: usize| match measure {
-        Measure::HardyBonds => true,
-        Measure::HardyWindow => false,
+        StressMethod::HardyBonds => true,
+        StressMethod::HardyWindow => false,
         _ => measure.is_partition() && !state.missing.is_window(site),
     };
     // no bond that crosses a window begins farther away
@@ -180,10 +185,10 @@ fn rim<const D: usize>(bonds: &LatticeBonds<D>, state: &Loaded<D>, measure: Meas
 /// Divisor of the sum over bonds, particle by particle.
 fn volumes<const D: usize>(
     bonds: &LatticeBonds<D>,
-    state: &Loaded<D>,
-    measure: Measure,
+    state: &StressInput<D>,
+    measure: StressMethod,
     ball: BallVolume,
-    window: Option<&Averaged<D>>,
+    window: Option<&AveragedWindow<D>>,
 ) -> Vec<f64> {
     let lattice = bonds.lattice();
     let thickness = lattice.volume / lattice.spacing.powi(D as i32);
@@ -194,16 +199,16 @@ fn volumes<const D: usize>(
         offsets.iter().copied().chain([[0; D]]).map(|o| (o, share)).collect::<Vec<_>>()
     };
     let (cells, volume) = match (measure, ball, window) {
-        (Measure::BallShare, BallVolume::Particles, _) => (sites(), whole),
-        (Measure::BallShare, BallVolume::Cells, _) => (cell_fractions::<D>(bonds.ratio()), whole),
-        (Measure::OnePoint, ..) => (Vec::new(), lattice.volume),
-        (Measure::HardyScaled, ..) => (sites(), lattice.volume),
+        (StressMethod::BallShare, BallVolume::Particles, _) => (sites(), whole),
+        (StressMethod::BallShare, BallVolume::Cells, _) => (cell_fractions::<D>(bonds.ratio()), whole),
+        (StressMethod::OnePoint, ..) => (Vec::new(), lattice.volume),
+        (StressMethod::HardyScaled, ..) => (sites(), lattice.volume),
         (_, _, Some(window)) => (window.cells(), lattice.volume),
         _ => (Vec::new(), whole),
     };
     let shared = |site: usize| match measure {
-        Measure::HardyWindow => true,
-        Measure::HardyBonds => false,
+        StressMethod::HardyWindow => true,
+        StressMethod::HardyBonds => false,
         _ => !measure.is_partition() || state.missing.is_window(site),
     };
     shares(bonds, &cells, shared).into_iter().map(|s| s * volume).collect()

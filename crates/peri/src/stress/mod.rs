@@ -7,15 +7,15 @@
 //! particle's cell do.
 
 mod ball;
+mod bond_forces;
 mod cloud;
 mod convolution;
 mod lattice;
-mod pull;
 mod window;
 
 pub use ball::{ball_volume, cell_fractions, segment_fraction};
 
-use crate::bonds::{BodyGeometry, BondForces, Bonds, CloudBonds, GradientSums, Kind, LatticeBonds};
+use crate::bonds::{BodyGeometry, BondForces, BondKind, Bonds, CloudBonds, GradientSums, LatticeBonds};
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::potential::KernelFit;
 use rayon::prelude::*;
@@ -23,20 +23,20 @@ use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
 /// A second-order tensor of dimension `D`, row by row.
-pub type Tensor<const D: usize> = [[f64; D]; D];
+pub type StressTensor<const D: usize> = [[f64; D]; D];
 
 /// Measure of stress.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
-pub enum Measure {
+pub enum StressMethod {
     /// All bonds crossing the ball, by the fraction inside, averaged over the particle's cell: weights that
-    /// sum to 1 for every bond offset; [`Missing`] treats surfaces.
+    /// sum to 1 for every bond offset; [`SurfaceCompensation`] treats surfaces.
     #[default]
     Hardy,
-    /// [`Self::Hardy`] with [`Missing::Bonds`] everywhere.
+    /// [`Self::Hardy`] with [`SurfaceCompensation::Bonds`] everywhere.
     HardyBonds,
-    /// [`Self::Hardy`] with [`Missing::Window`] everywhere.
+    /// [`Self::Hardy`] with [`SurfaceCompensation::Window`] everywhere.
     HardyWindow,
     /// Without the average over the cell: every bond's weights are divided by their sum.
     HardyScaled,
@@ -59,7 +59,7 @@ pub enum Measure {
     Constitutive,
 }
 
-impl Measure {
+impl StressMethod {
     /// All measures of bond forces.
     pub const ALL: [Self; 10] = [
         Self::Hardy,
@@ -104,7 +104,7 @@ impl Measure {
 
 /// Compensation for bonds missing at a surface, of the measures whose weights sum to 1, on a lattice.
 #[derive(Clone, Copy, Debug, Default)]
-pub enum Missing<'a> {
+pub enum SurfaceCompensation<'a> {
     /// Divides every bond offset by the weights of the bonds whose two particles exist; a broken bond counts,
     /// with no force. A uniform strain is then exact up to the surface; under a body force it extrapolates.
     #[default]
@@ -115,7 +115,7 @@ pub enum Missing<'a> {
     WindowAt(&'a [bool]),
 }
 
-impl Missing<'_> {
+impl SurfaceCompensation<'_> {
     fn is_window(self, site: usize) -> bool {
         match self {
             Self::Bonds => false,
@@ -125,7 +125,7 @@ impl Missing<'_> {
     }
 }
 
-/// Volume Ω of the averaging ball inside the body, for [`Measure::BallShare`].
+/// Volume Ω of the averaging ball inside the body, for [`StressMethod::BallShare`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
@@ -141,7 +141,7 @@ pub enum BallVolume {
 }
 
 /// Bond law and state from which stresses follow.
-pub struct Loaded<'a, const D: usize> {
+pub struct StressInput<'a, const D: usize> {
     /// Displacement, m.
     pub displacement: &'a Field<D>,
     /// Fitted bond law, covering the stretches of `displacement`.
@@ -149,14 +149,14 @@ pub struct Loaded<'a, const D: usize> {
     /// kθ.
     pub modulus: f64,
     /// Compensation for bonds missing at surfaces.
-    pub missing: Missing<'a>,
+    pub missing: SurfaceCompensation<'a>,
 }
 
 /// Stress of every particle by one of several measures.
 #[derive(Clone, Debug)]
-pub struct Measured<const D: usize> {
+pub struct MeasuredStress<const D: usize> {
     /// First Piola–Kirchhoff stress, in the order of [`BodyGeometry::particles`], Pa.
-    pub piola: Vec<Tensor<D>>,
+    pub piola: Vec<StressTensor<D>>,
     /// Seconds that this measure takes on its own, including the forces of all bonds, which several measures
     /// on a lattice share.
     pub seconds: f64,
@@ -165,19 +165,19 @@ pub struct Measured<const D: usize> {
 /// Computes [`piola`] of several measures. On a lattice they share the forces of bonds.
 pub fn piolas<const D: usize>(
     bonds: &dyn Bonds<D>,
-    state: &Loaded<D>,
-    measures: &[Measure],
+    state: &StressInput<D>,
+    measures: &[StressMethod],
     ball: BallVolume,
-) -> Vec<Measured<D>> {
-    if let Kind::Lattice(lattice) = bonds.kind()
-        && !measures.contains(&Measure::Constitutive)
+) -> Vec<MeasuredStress<D>> {
+    if let BondKind::Lattice(lattice) = bonds.kind()
+        && !measures.contains(&StressMethod::Constitutive)
     {
         return lattice::piolas(lattice, state, measures, ball);
     }
-    let one = |&measure: &Measure| {
+    let one = |&measure: &StressMethod| {
         let started = Instant::now();
         let piola = piola(bonds, state, measure, ball);
-        Measured { piola, seconds: started.elapsed().as_secs_f64() }
+        MeasuredStress { piola, seconds: started.elapsed().as_secs_f64() }
     };
     measures.iter().map(one).collect()
 }
@@ -186,13 +186,13 @@ pub fn piolas<const D: usize>(
 /// Pa.
 pub fn piola<const D: usize>(
     bonds: &dyn Bonds<D>,
-    state: &Loaded<D>,
-    measure: Measure,
+    state: &StressInput<D>,
+    measure: StressMethod,
     ball: BallVolume,
-) -> Vec<Tensor<D>> {
+) -> Vec<StressTensor<D>> {
     match bonds.kind() {
-        Kind::Lattice(lattice) => piola_on_lattice(lattice, state, measure, ball),
-        Kind::Cloud(cloud) => piola_in_cloud(cloud, state, measure, ball),
+        BondKind::Lattice(lattice) => piola_on_lattice(lattice, state, measure, ball),
+        BondKind::Cloud(cloud) => piola_in_cloud(cloud, state, measure, ball),
     }
 }
 
@@ -200,11 +200,11 @@ pub fn piola<const D: usize>(
 /// Pa, on a lattice.
 pub fn piola_on_lattice<const D: usize>(
     bonds: &LatticeBonds<D>,
-    state: &Loaded<D>,
-    measure: Measure,
+    state: &StressInput<D>,
+    measure: StressMethod,
     ball: BallVolume,
-) -> Vec<Tensor<D>> {
-    if measure == Measure::Constitutive {
+) -> Vec<StressTensor<D>> {
+    if measure == StressMethod::Constitutive {
         return vec![[[f64::NAN; D]; D]; bonds.particles().len()];
     }
     lattice::piolas(bonds, state, &[measure], ball).swap_remove(0).piola
@@ -215,15 +215,15 @@ pub fn piola_on_lattice<const D: usize>(
 ///
 /// A cloud has neither common offsets of bonds nor cells: a measure whose weights sum to 1 distributes every
 /// bond over the particles whose windows it crosses, by volume × bond function, so that the sum of P V is
-/// that of f ⊗ ξ over all bonds; [`Loaded::missing`] has no effect. Measures that need a lattice
-/// ([`Measure::needs_lattice`]) are treated as [`Measure::Hardy`]; scenes refuse them.
+/// that of f ⊗ ξ over all bonds; [`StressInput::missing`] has no effect. Measures that need a lattice
+/// ([`StressMethod::needs_lattice`]) are treated as [`StressMethod::Hardy`]; scenes refuse them.
 pub fn piola_in_cloud<const D: usize>(
     bonds: &CloudBonds<D>,
-    state: &Loaded<D>,
-    measure: Measure,
+    state: &StressInput<D>,
+    measure: StressMethod,
     ball: BallVolume,
-) -> Vec<Tensor<D>> {
-    if measure == Measure::Constitutive {
+) -> Vec<StressTensor<D>> {
+    if measure == StressMethod::Constitutive {
         return vec![[[f64::NAN; D]; D]; bonds.particles().len()];
     }
     cloud::piola(bonds, state, measure, ball)
@@ -248,7 +248,7 @@ pub(crate) fn force_over_length<const D: usize>(
 pub fn deformation_gradients<const D: usize>(
     bonds: &dyn BondForces<D>,
     displacement: &Field<D>,
-) -> Vec<Tensor<D>> {
+) -> Vec<StressTensor<D>> {
     let particles = bonds.particles();
     // sums of one work item; `None` if bonds have to be visited one by one
     let chunk = |chunk: usize| {
@@ -258,7 +258,7 @@ pub fn deformation_gradients<const D: usize>(
             [sites.start, sites.end].map(|end| particles.partition_point(|&s| (s as usize) < end));
         Some(particles[from..to].iter().map(|&site| gradient(&sums[site as usize - sites.start])).collect())
     };
-    let chunks: Option<Vec<Vec<Tensor<D>>>> =
+    let chunks: Option<Vec<Vec<StressTensor<D>>>> =
         (0..bonds.sites().div_ceil(CHUNK)).into_par_iter().map(chunk).collect();
     if let Some(chunks) = chunks {
         return chunks.concat();
@@ -282,10 +282,10 @@ pub fn deformation_gradients<const D: usize>(
 }
 
 /// Computes 1 + change·shape⁻¹; the identity if there is no inverse.
-fn gradient<const D: usize>(sums: &GradientSums<D>) -> Tensor<D> {
-    let matrix = |t: &Tensor<D>| nalgebra::SMatrix::<f64, D, D>::from_fn(|a, b| t[a][b]);
+fn gradient<const D: usize>(sums: &GradientSums<D>) -> StressTensor<D> {
+    let matrix = |t: &StressTensor<D>| nalgebra::SMatrix::<f64, D, D>::from_fn(|a, b| t[a][b]);
     let shape = matrix(&sums.shape);
-    let mut gradient: Tensor<D> =
+    let mut gradient: StressTensor<D> =
         std::array::from_fn(|a| std::array::from_fn(|b| f64::from(u8::from(a == b))));
     let singular = determinant::<D>(|a, b| shape[(a, b)]).abs() <= 1e-9 * shape.trace().powi(D as i32);
     if let Some(inverse) = shape.try_inverse().filter(|_| !singular) {
@@ -300,8 +300,11 @@ fn gradient<const D: usize>(sums: &GradientSums<D>) -> Tensor<D> {
 }
 
 /// Computes the Cauchy stress σ = P Fᵀ/J, Eq. (2.32), particle by particle.
-pub fn cauchy<const D: usize>(piola: &[Tensor<D>], gradients: &[Tensor<D>]) -> Vec<Tensor<D>> {
-    let one = |(p, f): (&Tensor<D>, &Tensor<D>)| -> Tensor<D> {
+pub fn cauchy<const D: usize>(
+    piola: &[StressTensor<D>],
+    gradients: &[StressTensor<D>],
+) -> Vec<StressTensor<D>> {
+    let one = |(p, f): (&StressTensor<D>, &StressTensor<D>)| -> StressTensor<D> {
         let jacobian = determinant::<D>(|a, b| f[a][b]);
         // an inverted family has no Cauchy stress; its nominal stress replaces it
         if jacobian <= 0.0 {

@@ -1,6 +1,6 @@
 //! Localisation functions φ of Hardy's stress, Eqs (2.15)–(2.18), averaged over a particle's cell.
 
-use super::{Measure, segment_fraction};
+use super::{StressMethod, segment_fraction};
 use rayon::prelude::*;
 
 /// Standard deviation of the Gaussian window over its cut-off radius.
@@ -8,7 +8,7 @@ const DEVIATION: f64 = 1.0 / 3.0;
 
 /// Shape of a localisation function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Window {
+pub enum StressWindow {
     /// Eq. (2.29): constant in the ball.
     Ball,
     /// exp(−r²/2s²), s a third of the ball's radius, zero outside.
@@ -19,13 +19,13 @@ pub enum Window {
     Cell,
 }
 
-impl Window {
+impl StressWindow {
     /// Window of a measure that is a sum over bonds with a bond function.
-    pub fn of(measure: Measure) -> Self {
+    pub fn for_measure(measure: StressMethod) -> Self {
         match measure {
-            Measure::Gaussian => Self::Gaussian,
-            Measure::Spline => Self::Spline,
-            Measure::LehoucqSilling => Self::Cell,
+            StressMethod::Gaussian => Self::Gaussian,
+            StressMethod::Spline => Self::Spline,
+            StressMethod::LehoucqSilling => Self::Cell,
             _ => Self::Ball,
         }
     }
@@ -50,7 +50,7 @@ impl Window {
 
 /// A window averaged over a cell of edge 1, tabulated on a grid finer than the cells. Its values at points
 /// one cell apart have the same sum wherever the points lie: a partition of unity over the lattice.
-pub struct Averaged<const D: usize> {
+pub struct AveragedWindow<const D: usize> {
     /// Intervals per cell.
     fine: usize,
     /// Cells from the centre to the table's ends.
@@ -60,14 +60,14 @@ pub struct Averaged<const D: usize> {
     values: Vec<f64>,
 }
 
-impl<const D: usize> Averaged<D> {
+impl<const D: usize> AveragedWindow<D> {
     /// Averages a window of `radius` cells.
-    pub fn new(window: Window, radius: f64) -> Self {
-        let radius = if window == Window::Cell { 1.0 } else { radius };
+    pub fn new(window: StressWindow, radius: f64) -> Self {
+        let radius = if window == StressWindow::Cell { 1.0 } else { radius };
         let reach = (radius + 0.5).ceil() as usize + 1;
         // even, and in solids fewer for long horizons
         let fine = if D == 2 { 16 } else { (48 / reach).clamp(2, 6) & !1 };
-        let steps = if window == Window::Cell { fine } else { 4 };
+        let steps = if window == StressWindow::Cell { fine } else { 4 };
         let side = 2 * reach * fine;
         let place = |i: usize| (i as f64 + 0.5) / fine as f64 - reach as f64;
         let values = (0..side.pow(D as u32))
@@ -82,7 +82,7 @@ impl<const D: usize> Averaged<D> {
     }
 
     /// Averaged window at a point, linear between nodes.
-    pub fn at(&self, x: [f64; D]) -> f64 {
+    pub fn value_at(&self, x: [f64; D]) -> f64 {
         let side = self.side();
         let (mut base, mut part) = (0, [0.0; D]);
         for d in (0..D).rev() {
@@ -131,7 +131,7 @@ impl<const D: usize> Averaged<D> {
                 });
                 let along = |k: usize| {
                     let alpha = (k as f64 + 0.5) / steps as f64;
-                    self.at(std::array::from_fn(|d| f64::from(start[d]) + alpha * f64::from(offset[d])))
+                    self.value_at(std::array::from_fn(|d| f64::from(start[d]) + alpha * f64::from(offset[d])))
                 };
                 let sum: f64 = (0..steps).map(along).sum();
                 (sum > 0.0).then_some((start, sum / steps as f64))
@@ -149,7 +149,7 @@ impl<const D: usize> Averaged<D> {
                 let cell: [i32; D] =
                     std::array::from_fn(|d| (index / across.pow(d as u32) % across) as i32 - reach);
                 let part = |t: usize| {
-                    self.at(std::array::from_fn(|d| {
+                    self.value_at(std::array::from_fn(|d| {
                         f64::from(cell[d]) + middle(t / fine.pow(d as u32) % fine)
                     }))
                 };
@@ -164,9 +164,9 @@ impl<const D: usize> Averaged<D> {
 
 /// Mean of a window of `radius` about the origin over the segment from `p` to `q`, Eq. (2.15), over its value
 /// at the centre.
-pub fn bond_function<const D: usize>(window: Window, p: [f64; D], q: [f64; D], radius: f64) -> f64 {
+pub fn bond_function<const D: usize>(window: StressWindow, p: [f64; D], q: [f64; D], radius: f64) -> f64 {
     let inside = segment_fraction(p, q, radius * radius);
-    if window == Window::Ball || inside == 0.0 {
+    if window == StressWindow::Ball || inside == 0.0 {
         return inside;
     }
     // the part inside the ball is symmetric about the point nearest its centre, cut off by the ends
@@ -183,7 +183,7 @@ pub fn bond_function<const D: usize>(window: Window, p: [f64; D], q: [f64; D], r
     let along = |alpha: f64| (alpha - nearest) * unit;
     let square = (foot / (radius * radius)).max(0.0);
     let sum = match window {
-        Window::Spline => {
+        StressWindow::Spline => {
             // the pieces meet at half the radius
             let inner = reach(0.5 * radius);
             let knots = [low, nearest - inner, nearest + inner, high].map(|k| along(k.clamp(low, high)));
@@ -241,7 +241,8 @@ mod tests {
     use super::*;
     use crate::bonds::Stencil;
 
-    const WINDOWS: [Window; 4] = [Window::Ball, Window::Gaussian, Window::Spline, Window::Cell];
+    const WINDOWS: [StressWindow; 4] =
+        [StressWindow::Ball, StressWindow::Gaussian, StressWindow::Spline, StressWindow::Cell];
 
     /// Checks that Σ_p φ(p + x) over the lattice does not depend on x; without the average over the cell it
     /// does, by several percent.
@@ -257,12 +258,12 @@ mod tests {
         };
         let places = [[0.0; D], [0.5; D], std::array::from_fn(|d| 0.137 + 0.31 * d as f64)];
         for window in WINDOWS {
-            let table = Averaged::<D>::new(window, ratio);
-            let [a, b, c] = places.map(|x| sum(x, &|x| table.at(x)));
+            let table = AveragedWindow::<D>::new(window, ratio);
+            let [a, b, c] = places.map(|x| sum(x, &|x| table.value_at(x)));
             // rounding of some thousand additions
             assert!((b / a - 1.0).abs() < 1e-12 && (c / a - 1.0).abs() < 1e-12, "{window:?} {a} {b} {c}");
         }
-        let plain = places.map(|x| sum(x, &|x| Window::Ball.value(x, ratio)));
+        let plain = places.map(|x| sum(x, &|x| StressWindow::Ball.value(x, ratio)));
         assert!(plain.iter().any(|p| (p / plain[0] - 1.0).abs() > 5e-3), "{plain:?}");
     }
 
@@ -281,13 +282,13 @@ mod tests {
     #[test]
     fn weights_of_every_bond_sum_to_the_same() {
         for ratio in [3.015, 4.015, 6.015] {
-            let table = Averaged::<3>::new(Window::Ball, ratio);
+            let table = AveragedWindow::<3>::new(StressWindow::Ball, ratio);
             let shares = table.cells();
             assert!((shares.iter().map(|s| s.1).sum::<f64>() - 1.0).abs() < 1e-13);
             let far = ratio as i32 + 3;
             let whole: f64 = (-far..=far)
                 .flat_map(|x| (-far..=far).flat_map(move |y| (-far..=far).map(move |z| [x, y, z])))
-                .map(|p| table.at(p.map(f64::from)))
+                .map(|p| table.value_at(p.map(f64::from)))
                 .sum();
             let stencil = Stencil::<3>::new(ratio);
             let step = if ratio > 4.5 { 29 } else { 7 };
@@ -306,7 +307,7 @@ mod tests {
             let values: Vec<f64> = (0..40).map(|k| window.value([0.05 * f64::from(k), 0.0], 1.5)).collect();
             assert!(values[0] == 1.0 && values.windows(2).all(|v| v[1] <= v[0]) && values[31] == 0.0);
         }
-        for window in [Window::Ball, Window::Gaussian, Window::Spline] {
+        for window in [StressWindow::Ball, StressWindow::Gaussian, StressWindow::Spline] {
             for (p, q) in [
                 ([-2.0, 0.3], [1.9, -0.4]),
                 ([0.1, 0.2], [0.9, 1.0]),

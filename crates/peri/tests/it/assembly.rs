@@ -1,4 +1,4 @@
-//! What compilers make of the kernels: inner loops over bonds that keep their sums in registers.
+//! Compiled kernels: inner loops over bonds keep their sums in registers.
 
 use std::process::Command;
 
@@ -34,7 +34,7 @@ fn spills(function: &[(u64, &str)]) -> Vec<usize> {
     found
 }
 
-/// With AVX-512 no vector goes to the stack. With AVX2, which has 16 registers, at most four do: the
+/// No vector goes to the stack with AVX-512. With AVX2, which has 16 registers, at most four do: the
 /// components of ζ until the law is evaluated, the least and the largest stretch.
 #[test]
 fn inner_loops_do_not_spill() {

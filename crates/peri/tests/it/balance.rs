@@ -6,7 +6,7 @@ use crate::bodies::{
 use peri::bonds::{BondForces, Bonds, CloudBonds, VolumeCorrection};
 use peri::potential::{KernelFit, Law};
 
-/// Both paths' forces on particles in input order.
+/// Forces of both representations on particles in input order.
 fn both<const D: usize>(
     built: &mut Built<D>,
     fit: &KernelFit,
@@ -216,7 +216,7 @@ fn check_gradient<const D: usize>(cells: [usize; D]) {
             let energy = |d: usize, step: f64| -> f64 {
                 let mut moved = u.clone();
                 moved[particle][d] += step;
-                let of = |p: &&crate::bodies::Pair<D>| {
+                let of = |p: &&crate::bodies::BondPair<D>| {
                     p.weight * p.length * potential.energy(p.deformed(&moved).1)
                 };
                 2.0 * MODULUS * volume * own.iter().map(of).sum::<f64>()
@@ -248,7 +248,7 @@ fn forces_are_the_gradient_of_the_energy() {
     check_gradient([8, 8, 7]);
 }
 
-/// The range of stretches the kernels report is the one the bonds have.
+/// The range of stretches reported by the kernels is that of the bonds.
 #[test]
 fn stretches_are_tracked() {
     fn check<const D: usize>(cells: [usize; D]) {

@@ -1,5 +1,5 @@
-//! One body in both representations, random displacements, and the plain sums of Eqs (2.6) and (2.47) to
-//! compare with.
+//! A body in both representations, random displacements, and the plain sums of Eqs (2.6) and (2.47) for
+//! comparison.
 
 use peri::bonds::{BodyGeometry, BondForces, Bonds, CloudBonds, LatticeBonds, VolumeCorrection, force};
 use peri::correction::surface_factors;
@@ -20,7 +20,7 @@ pub struct Slit {
     pub to: f64,
 }
 
-/// What a body is made of.
+/// Description of a body.
 #[derive(Clone)]
 pub struct Body<const D: usize> {
     pub operations: Vec<Operation<D>>,
@@ -28,11 +28,11 @@ pub struct Body<const D: usize> {
     pub ratio: f64,
     pub volume_correction: VolumeCorrection,
     pub slits: Vec<Slit>,
-    /// C₁₁₁₁ of the energy surface correction, where wanted.
+    /// C₁₁₁₁ of the energy surface correction, if wanted.
     pub surface: Option<f64>,
 }
 
-/// The same body on a lattice and as a cloud, and where each particle (in input order) is stored.
+/// The same body on a lattice and as a cloud, and the site of each particle (in input order).
 pub struct Built<const D: usize> {
     pub lattice: LatticeBonds<D>,
     pub cloud: CloudBonds<D>,
@@ -113,7 +113,7 @@ impl<const D: usize> Body<D> {
 
     /// Pairs (I, J), I < J, with their reference bond and weight (volume × surface correction), by comparing
     /// all.
-    pub fn pairs(&self, points: &[[f64; D]]) -> Vec<Pair<D>> {
+    pub fn pairs(&self, points: &[[f64; D]]) -> Vec<BondPair<D>> {
         // the smallest gap between lattice distances near the horizons used here is far above this rounding
         // margin
         let square = self.horizon().powi(2) * (1.0 + 1e-12);
@@ -126,7 +126,7 @@ impl<const D: usize> Body<D> {
                     let part = (self.horizon() + 0.5 * self.spacing - length) / self.spacing;
                     let linear = self.volume_correction == VolumeCorrection::Linear;
                     let weight = if linear { part.clamp(0.0, 1.0) } else { 1.0 };
-                    pairs.push(Pair { i, j, bond, length, weight });
+                    pairs.push(BondPair { i, j, bond, length, weight });
                 }
             }
         }
@@ -137,7 +137,7 @@ impl<const D: usize> Body<D> {
     }
 
     /// Madenci & Oterkus (2014), §4.2, as in `s12_mosurf.py`.
-    fn correct(&self, pairs: &mut [Pair<D>], count: usize, stiffness: f64) {
+    fn correct(&self, pairs: &mut [BondPair<D>], count: usize, stiffness: f64) {
         let volume = self.spacing.powi(D as i32);
         let mut energy = vec![[0.0; D]; count];
         for pair in pairs.iter() {
@@ -163,7 +163,7 @@ impl<const D: usize> Body<D> {
     /// Force densities f_I = Σ_J 2kθ t(λ) w V_J ζ/|ζ|, and the sum of the magnitudes in each.
     pub fn plain_forces(
         &self,
-        pairs: &[Pair<D>],
+        pairs: &[BondPair<D>],
         law: &dyn BondPotential,
         displacement: &[[f64; D]],
     ) -> (Vec<[f64; D]>, Vec<f64>) {
@@ -195,7 +195,7 @@ impl Slit {
 
 /// A bond between two particles.
 #[derive(Clone, Copy)]
-pub struct Pair<const D: usize> {
+pub struct BondPair<const D: usize> {
     pub i: usize,
     pub j: usize,
     pub bond: [f64; D],
@@ -203,7 +203,7 @@ pub struct Pair<const D: usize> {
     pub weight: f64,
 }
 
-impl<const D: usize> Pair<D> {
+impl<const D: usize> BondPair<D> {
     /// ζ and the stretch λ.
     pub fn deformed(&self, displacement: &[[f64; D]]) -> ([f64; D], f64) {
         let zeta = std::array::from_fn(|d| self.bond[d] + displacement[self.j][d] - displacement[self.i][d]);
@@ -212,7 +212,7 @@ impl<const D: usize> Pair<D> {
 }
 
 /// Smallest and largest stretch of all pairs, a little widened.
-pub fn stretch_range<const D: usize>(pairs: &[Pair<D>], displacement: &[[f64; D]]) -> [f64; 2] {
+pub fn stretch_range<const D: usize>(pairs: &[BondPair<D>], displacement: &[[f64; D]]) -> [f64; 2] {
     let range = pairs
         .iter()
         .map(|pair| pair.deformed(displacement).1)
@@ -220,7 +220,7 @@ pub fn stretch_range<const D: usize>(pairs: &[Pair<D>], displacement: &[[f64; D]
     [range[0] - 1e-3, range[1] + 1e-3]
 }
 
-/// Forces of every particle in input order; `sites` says where each is stored.
+/// Forces of every particle in input order; `sites` has the site of each.
 pub fn forces<const D: usize>(
     bonds: &dyn Bonds<D>,
     sites: &[usize],
@@ -246,7 +246,7 @@ pub fn laws() -> impl Iterator<Item = (Law, Box<dyn BondPotential>)> {
     Law::ALL.into_iter().map(|law| (law, law.build(720.0, 1200.0, false).unwrap()))
 }
 
-/// Relaxes `state` under `loads`, without a look at what happens on the way.
+/// Relaxes `state` under `loads`, without callbacks.
 pub fn relax<const D: usize>(
     solver: &DynamicRelaxation,
     bonds: &mut dyn Bonds<D>,
@@ -260,8 +260,8 @@ pub fn relax<const D: usize>(
     solver.solve(&mut system, state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))
 }
 
-/// Prescribes the components `constrained` (bits) of the particles that `choose` picks at the displacements
-/// it gives.
+/// Prescribes the components `constrained` (bits) of the particles that `choose` selects at the displacements
+/// that it returns.
 pub fn hold<const D: usize>(
     bonds: &dyn Bonds<D>,
     choose: impl Fn([f64; D]) -> Option<(u8, [f64; D])>,
@@ -292,7 +292,7 @@ impl Random {
         (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
     }
 
-    /// One vector per particle, each component within ±`size`.
+    /// Random vectors, one per particle, each component within ±`size`.
     pub fn vectors<const D: usize>(&mut self, count: usize, size: f64) -> Vec<[f64; D]> {
         (0..count).map(|_| std::array::from_fn(|_| size * self.next())).collect()
     }

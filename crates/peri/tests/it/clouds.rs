@@ -12,7 +12,9 @@ use peri::bonds::{
 };
 use peri::calibrate::Space;
 use peri::field::Field;
-use peri::material::{Family, Material, NonlocalSolid, PointLaw, Pointwise, Response, Tensor, relief};
+use peri::material::{
+    BodyTensor, Family, Material, NonlocalSolid, PointLaw, Pointwise, SolverMaterial, relief,
+};
 use peri::solver::{Lbfgs, Method, State, System};
 use std::f64::consts::PI;
 
@@ -33,7 +35,7 @@ impl Scattered {
         Self { side, spacing: 1.0, ratio: 3.015, jitter, uneven: 0.0, correction }
     }
 
-    /// The bonds, with θ where `relieved`.
+    /// Builds the bonds, with θ if `relieved`.
     fn build<const D: usize>(&self, relieved: bool) -> CloudBonds<D> {
         let mut random = Random(5);
         let count = self.side.pow(D as u32);
@@ -74,7 +76,7 @@ fn largest<const D: usize>(field: &Field<D>) -> f64 {
     field.components().iter().flat_map(|c| c.iter()).fold(0.0, |most, x| most.max(x.abs()))
 }
 
-/// Severs each bond that `choose` names by its ends, from both of them.
+/// Severs each bond that `choose` selects by its ends, from both of them.
 fn sever<const D: usize>(bonds: &mut CloudBonds<D>, mut choose: impl FnMut(usize, usize) -> bool) {
     let mut list = Vec::new();
     for site in 0..bonds.sites() {
@@ -88,7 +90,7 @@ fn sever<const D: usize>(bonds: &mut CloudBonds<D>, mut choose: impl FnMut(usize
             }
         });
     }
-    bonds.sever(&list);
+    bonds.break_bonds(&list);
 }
 
 /// Names a bond from both of its ends.
@@ -242,7 +244,7 @@ fn patch<L: PointLaw<D>, const D: usize>(
     let (mut residual, mut off) = (0.0_f64, 0.0_f64);
     for site in sites(bonds) {
         let found = material.points()[site].deformation().unwrap().displacement_gradient;
-        off = off.max((found - Tensor::<D>::from_fn(|a, b| gradient[a][b])).amax());
+        off = off.max((found - BodyTensor::<D>::from_fn(|a, b| gradient[a][b])).amax());
         if bonds.position(site).iter().all(|&x| inside(x)) {
             let force = force.get(site).iter().fold(0.0_f64, |most, f| most.max(f.abs()));
             residual = residual.max(force * bonds.volume(site));
@@ -310,7 +312,7 @@ fn forces_in_relieved_clouds_are_slopes() {
     slopes::<3>(Space::Solid, 8, 2.015);
 }
 
-/// What a bond releases is the slope of the energy by its integrity, to the digits of differences.
+/// The energy released by a bond is the slope of the energy by its integrity, to the digits of differences.
 #[test]
 fn bonds_of_relieved_clouds_release_the_slope_of_the_energy() {
     let mut bonds = Scattered { uneven: 0.2, ..Scattered::new(12, 0.2) }.build::<2>(true);

@@ -22,7 +22,7 @@ fn determinant<const D: usize>(c: &[Whole<D>; D]) -> i64 {
     (0..3).map(cyclic).sum()
 }
 
-/// Whether a bond crosses the inside of a cut, by Cramer's rule without rounding.
+/// Returns true if a bond crosses the inside of a cut, by Cramer's rule without rounding.
 fn crosses<const D: usize>(a: Whole<D>, b: Whole<D>, corner: Whole<D>, edges: &[Whole<D>]) -> bool {
     let mut columns = [[0; D]; D];
     columns[0] = std::array::from_fn(|d| b[d] - a[d]);
@@ -36,8 +36,8 @@ fn crosses<const D: usize>(a: Whole<D>, b: Whole<D>, corner: Whole<D>, edges: &[
     })
 }
 
-/// Both representations of a box of cells, its cracks given in quarters of the spacing; every bond, from both
-/// ends.
+/// Checks both representations of a box of cells, its cracks given in quarters of the spacing; every bond,
+/// from both ends.
 fn check<const D: usize>(
     cells: [usize; D],
     (spacing, origin): (f64, f64),

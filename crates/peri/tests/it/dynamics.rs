@@ -6,13 +6,13 @@ use peri::bonds::{BodyGeometry, BondForces, Bonds, force};
 use peri::field::Field;
 use peri::material::BondMaterial;
 use peri::potential::{BondPotential, Law};
-use peri::solver::{Breaking, Loads, Method, Policy, Record, State, System, VelocityVerlet};
-use peri::stress::{BallVolume, Loaded, Measure, Missing, piola_on_lattice};
+use peri::solver::{Breaking, Loads, Method, Policy, State, StepRecord, System, VelocityVerlet};
+use peri::stress::{BallVolume, StressInput, StressMethod, SurfaceCompensation, piola_on_lattice};
 use std::f64::consts::PI;
 
 pub const DENSITY: f64 = 2.3;
 
-/// Runs to the end without a look at what happens on the way.
+/// Runs to the end without callbacks.
 pub fn run<const D: usize>(
     solver: &VelocityVerlet,
     bonds: &mut dyn Bonds<D>,
@@ -189,10 +189,11 @@ fn energies_balance() {
         let last = state.history.last().unwrap();
         assert_eq!((last.time, last.factor), (end, 1.0));
         let scale = state.history.iter().map(|r| r.work.abs()).fold(0.0, f64::max);
-        let error = |r: &Record| r.kinetic + r.stored + r.released + r.damped - r.work;
+        let error = |r: &StepRecord| r.kinetic + r.stored + r.released + r.damped - r.work;
         let worst = state.history.iter().map(|r| error(r).abs()).fold(0.0, f64::max) / scale;
         eprintln!(
-            "step {part} of critical, damping {damping}, {} broken: work {:.3e}, kinetic {:.3e}, stored {:.3e}, \
+            "step {part} of critical, damping {damping}, {} broken: work {:.3e}, kinetic {:.3e}, stored \
+            {:.3e}, \
              released {:.3e}, damped {:.3e} J; off by {worst:.1e}",
             last.broken, last.work, last.kinetic, last.stored, last.released, last.damped
         );
@@ -337,8 +338,13 @@ fn rigid_rotation() {
         force(bonds, &u, &mut out);
         let each = bonds.particles().iter().map(|&s| norm(out.get(s as usize)));
         largest = largest.max(each.fold(0.0, f64::max) / stiffness);
-        let loaded = Loaded { displacement: &u, fit: &fit, modulus: MODULUS, missing: Missing::Bonds };
-        for measure in [Measure::Hardy, Measure::BallShare, Measure::OnePoint] {
+        let loaded = StressInput {
+            displacement: &u,
+            fit: &fit,
+            modulus: MODULUS,
+            missing: SurfaceCompensation::Bonds,
+        };
+        for measure in [StressMethod::Hardy, StressMethod::BallShare, StressMethod::OnePoint] {
             let piola = piola_on_lattice(bonds, &loaded, measure, BallVolume::Particles);
             let each = piola.iter().flatten().flatten().map(|p| p.abs());
             stress = stress.max(each.fold(0.0, f64::max) / youngs);
@@ -366,7 +372,8 @@ fn rigid_rotation() {
     let energy =
         state.history.iter().map(|r| ((r.kinetic + r.stored) / r.work - 1.0).abs()).fold(0.0, f64::max);
     eprintln!(
-        "one free turn in {} steps: momentum {moved:.1e}, spin {turned:.1e}, energy {energy:.1e}, stretch {:.5}",
+        "one free turn in {} steps: momentum {moved:.1e}, spin {turned:.1e}, energy {energy:.1e}, stretch \
+        {:.5}",
         state.counts.total_iterations,
         state.history.last().unwrap().largest_stretch
     );

@@ -10,8 +10,8 @@ use peri::geometry::{Cut, Operation, Shape, lattice};
 use peri::material::BondMaterial;
 use peri::potential::{BondPotential, Law};
 use peri::solver::{
-    Adrift, Breaking, DynamicRelaxation, Lbfgs, Loads, Method, Policy, State, Stops, System, VelocityVerlet,
-    adrift, inverted,
+    Breaking, ContactStops, DynamicRelaxation, Lbfgs, Loads, Method, Policy, State, System, Unsupported,
+    VelocityVerlet, find_unsupported, inverted,
 };
 
 /// A force on some particles, N, spread evenly.
@@ -60,7 +60,7 @@ fn solved(
     (result, state)
 }
 
-/// One bond of the linear law, f = 2·3kθ(λ − 1)V²: the steps below the force at the critical stretch are
+/// A single bond of the linear law, f = 2·3kθ(λ − 1)V²: the steps below the force at the critical stretch are
 /// rows, the next ends the run.
 #[test]
 fn a_bond_holds_up_to_its_strength() {
@@ -138,8 +138,8 @@ fn torn_by_a_force() {
     }
 }
 
-/// Nothing holds it: refused before any iteration, along the axis that is missing; held along it or balanced,
-/// it is solved.
+/// Refuses an unsupported body before any iteration, along the axis that is missing; held along it or
+/// balanced, it is solved.
 #[test]
 fn free_bodies_under_forces() {
     for (held, force, missing) in [
@@ -170,8 +170,8 @@ fn free_bodies_under_forces() {
     solved(&mut bonds, &loads, &[1.0], None, &Lbfgs::default()).0.unwrap();
 }
 
-/// Two blocks a gap apart: what bears a force is judged part by part, and contact may hold what presses on
-/// something.
+/// Two blocks a gap apart: forces are judged part by part, and contact may hold a part that presses on
+/// another.
 #[test]
 fn parts_and_stops() {
     let block = |low: f64| Operation::Add(Shape::Box { min: [0.0, low], max: [8.0, low + 6.0] });
@@ -181,11 +181,11 @@ fn parts_and_stops() {
     let mut down = up.clone();
     push(&bonds, &mut up, [0.0, 2.0], |x| x[1] > 15.0);
     push(&bonds, &mut down, [0.0, -2.0], |x| x[1] > 15.0);
-    let free = Stops::default();
-    let pairs = Stops { pairs: true, ..Stops::default() };
-    let plane = |normal: f64| Stops { normals: vec![[0.0, normal]], ..Stops::default() };
-    let of = |loads: &Loads<2>, stops: &Stops<2>| adrift(&bonds, loads, None, stops, 1e-3);
-    let Some(Adrift { particles, of: all, middle, axis, force }) = of(&up, &free) else { panic!() };
+    let free = ContactStops::default();
+    let pairs = ContactStops { pairs: true, ..ContactStops::default() };
+    let plane = |normal: f64| ContactStops { normals: vec![[0.0, normal]], ..ContactStops::default() };
+    let of = |loads: &Loads<2>, stops: &ContactStops<2>| find_unsupported(&bonds, loads, None, stops, 1e-3);
+    let Some(Unsupported { particles, total: all, middle, axis, force }) = of(&up, &free) else { panic!() };
     assert_eq!((particles, all, axis), (48, 96, "y"));
     assert!(
         (force - 2.0).abs() < 1e-12 && (middle[1] - 15.0).abs() < 1e-12 && (middle[0] - 4.0).abs() < 1e-12
@@ -197,9 +197,9 @@ fn parts_and_stops() {
     );
 }
 
-/// One side moved past the other, in one step or many, of all components or of one; a region turned inside
-/// out; and what looks like it and is not: half the height, a punch through a ring, a part turned by a right
-/// angle.
+/// Refuses a side moved past the other, in one step or many, in all components or one, and a region turned
+/// inside out; accepts similar but valid cases: half the height, a punch through a ring, a part turned by a
+/// right angle.
 #[test]
 fn bodies_crushed_through_themselves() {
     let cube = || Body::<3>::solid([6, 6, 10], 0.1, 3.015).build().lattice;

@@ -51,7 +51,7 @@ fn right_half(bonds: &dyn Bonds<2>, stiffness: f64) -> Property {
     Property::new(bonds, |_, [x, _]| if x > 0.5 * LENGTH { stiffness } else { 1.0 })
 }
 
-/// A field that says one thing is that number, and leaves no factors to look up.
+/// A uniform field is a number, and leaves no factors to look up.
 #[test]
 fn a_constant_is_no_field() {
     let built = Body::<2>::solid([9, 7], 0.1, 3.015).build();

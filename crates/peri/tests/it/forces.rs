@@ -19,8 +19,8 @@ fn in_pieces<const D: usize>(bonds: &dyn Bonds<D>, u: &Field<D>) {
     }
 }
 
-/// Forces in mixed precision against those in double precision: each bond is wrong by roundings of single
-/// precision, and so is what the kernel sees of stretches.
+/// Compares forces in mixed precision with those in double precision: each bond, and each tracked stretch,
+/// has the rounding error of single precision.
 fn in_mixed_precision<const D: usize>(
     body: &Body<D>,
     fit: &KernelFit,
@@ -94,7 +94,8 @@ fn compare<const D: usize>(body: &Body<D>, size: f64, name: &str) {
             let allowed = (1.1 * fit.max_error + 1e-12) * sizes[particle] + 1e-14 * scale;
             assert!(
                 error <= allowed,
-                "{name}, {}, particle {particle} at {:?}: {found:?} against {exact:?}, off by {:.1e} of {:.1e}",
+                "{name}, {}, particle {particle} at {:?}: {found:?} against {exact:?}, off by {:.1e} of \
+                {:.1e}",
                 law.name(),
                 built.points[particle],
                 error,
@@ -127,9 +128,8 @@ fn paths_agree_in_space() {
     }
 }
 
-/// What mixed precision costs a body that has moved: single precision knows a displacement of n spacings to
-/// n·2⁻²⁴ of them. And a law over stretches so wide that single precision would miss it stays in double
-/// precision.
+/// Errors of mixed precision in a moved body: single precision resolves a displacement of n spacings to
+/// n·2⁻²⁴ of them. A law over stretches too wide for single precision stays in double precision.
 #[test]
 fn limits_of_mixed_precision() {
     let built = Body::<3>::solid([9, 8, 7], 0.1, 3.015).build();
@@ -158,7 +158,7 @@ fn limits_of_mixed_precision() {
     assert_eq!(error_at(&mut bonds, [0.1, 3.0], 0.0), 0.0);
 }
 
-/// A law that only the table holds runs the plain loops of both paths.
+/// A law that only the table represents runs the plain loops of both paths.
 #[test]
 fn paths_agree_on_a_tabulated_law() {
     let body = Body::<2>::damaged([15, 14], 0.1, 3.015);

@@ -5,19 +5,21 @@ use crate::bodies::{Body, MODULUS, Random, Slit, hold, norm};
 use crate::dynamics::DENSITY;
 use peri::Error;
 use peri::bonds::{BodyGeometry, Bonds, CloudBonds, VolumeCorrection};
-use peri::contact::{Contact, Plane, SHORT_RANGE};
+use peri::contact::{Contact, RigidPlane, SHORT_RANGE};
 use peri::field::{CHUNK, Field};
 use peri::material::BondMaterial;
 use peri::potential::Law;
-use peri::solver::{DynamicRelaxation, Lbfgs, Loads, Method, Record, State, Support, System, VelocityVerlet};
-use peri::surface::Surface;
+use peri::solver::{
+    DynamicRelaxation, Lbfgs, Loads, Method, State, StepRecord, Support, System, VelocityVerlet,
+};
+use peri::surface::BodySurface;
 
 const G: f64 = 9.81;
 
 /// Contact with planes, of a body of shapes, with M = 1 Pa.
-fn beside(bonds: &dyn Bonds<2>, pairs: f64, planes: Vec<Plane<2>>) -> Contact<2> {
+fn beside(bonds: &dyn Bonds<2>, pairs: f64, planes: Vec<RigidPlane<2>>) -> Contact<2> {
     let contact = Contact::short_range(bonds, MODULUS, pairs).unwrap();
-    contact.with_planes(bonds, &Surface::default(), 1.0, planes).unwrap()
+    contact.with_planes(bonds, &BodySurface::default(), 1.0, planes).unwrap()
 }
 
 /// Linear bonds, explicit dynamics.
@@ -34,7 +36,7 @@ fn run(
     solver.solve(&mut system, state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))
 }
 
-fn off(row: &Record) -> f64 {
+fn off(row: &StepRecord) -> f64 {
     row.work - row.kinetic - row.stored - row.rubbed - row.released - row.damped
 }
 
@@ -86,18 +88,18 @@ struct Incline {
 const PENALTY: f64 = 1e6;
 
 impl Incline {
-    fn run(&self) -> ([f64; 2], f64, Record) {
+    fn run(&self) -> ([f64; 2], f64, StepRecord) {
         let (sin, cos) = 0.3_f64.sin_cos();
         let (normal, along) = ([-sin, cos], [cos, sin]);
         let mut one = Body::<2>::solid([1, 1], 1.0, 3.015).build().lattice;
         let site = one.particles()[0] as usize;
         let place = one.position(site);
         let point = std::array::from_fn(|d| place[d] - 0.5 * normal[d]);
-        let plane = Plane {
+        let plane = RigidPlane {
             stiffness: PENALTY,
             friction: self.mu,
             velocity: along.map(|x| x * self.belt),
-            ..Plane::new(point, normal.map(|x| 7.0 * x))
+            ..RigidPlane::new(point, normal.map(|x| 7.0 * x))
         };
         let contact = beside(&one, 0.0, vec![plane]);
         let (pull, push) = (G * self.theta.sin(), G * self.theta.cos());
@@ -133,8 +135,8 @@ fn slides_down() {
     }
 }
 
-/// What sticks swings about its elastic slip mg sin θ/k_t by as much, and does not creep: as far after ten
-/// times the time.
+/// A sticking particle oscillates about its elastic slip mg sin θ/k_t by as much, and does not creep: as far
+/// after ten times the time.
 #[test]
 fn sticks_without_creep() {
     for (degrees, mu) in [(10.0_f64, 0.3), (20.0, 0.5), (20.0, 10.0)] {
@@ -144,7 +146,7 @@ fn sticks_without_creep() {
             let ([x, _], error, row) = incline.run();
             let slip = G * theta.sin() / PENALTY;
             eprintln!("sticks at {degrees}°, μ = {mu}: {x:e} m, slip {slip:e}, off by {error:.1e} J");
-            // at 10° the swing passes μN: 2 sin θ > μ cos θ, and what slides does so once
+            // at 10° the oscillation exceeds μN: 2 sin θ > μ cos θ, and the particle slides once
             let slides = (2.0 * theta.sin() - mu * theta.cos()).max(0.0) * G / PENALTY;
             assert!(x > -1e-9 && x < 2.0 * slip + slides && error.abs() < 1e-9, "{x:e}");
             assert!(row.rubbed < mu * G * 2.0 * slip);
@@ -165,8 +167,7 @@ fn stops_after() {
     }
 }
 
-/// On a belt a particle is dragged until it has the belt's velocity V; half of the belt's work mV² becomes
-/// heat.
+/// Drags a particle on a belt until it has the belt's velocity V; half of the belt's work mV² becomes heat.
 #[test]
 fn belt_drags() {
     let incline = Incline { theta: 0.0, mu: 0.4, v0: 0.0, time: 1.0, step: 1e-4, belt: 1.5 };
@@ -174,7 +175,7 @@ fn belt_drags() {
     let reached = 1.5 / (0.4 * G);
     let exact = 1.5 * (1.0 - reached) + 0.5 * 1.5 * reached;
     eprintln!("belt: {v:.6} m/s, {x:.6} m of {exact:.6}, heat {:.6} of 1.125 J, off {error:.1e}", row.rubbed);
-    // what sticks swings by its elastic slip at the frequency √(k/m) = 1e3/s
+    // a sticking particle oscillates by its elastic slip at the frequency √(k/m) = 1e3/s
     assert!((v - 1.5).abs() < 4e-3 && (x - exact).abs() < 1e-4 && error.abs() < 5e-6);
     assert!((row.rubbed - 1.125).abs() < 1e-4);
     let push = [-0.3_f64.sin(), 0.3_f64.cos()].map(|n| n * G);
@@ -184,8 +185,7 @@ fn belt_drags() {
     assert!(along.abs() <= 0.4 * G);
 }
 
-/// In equilibrium the drag of a belt grows as k_t U until it is μN, to rounding, whatever the number of
-/// steps.
+/// Equilibrium drag of a belt: it grows as k_t U until it is μN, to rounding, whatever the number of steps.
 #[test]
 fn belt_in_equilibrium() {
     for (method, steps) in [(0, 4), (1, 4), (1, 16), (1, 64)] {
@@ -193,11 +193,11 @@ fn belt_in_equilibrium() {
         let bonds = &mut built.lattice;
         let loads = hold(bonds, |_| Some((3, [0.0; 2])));
         let (mu, stiffness, deep) = (0.5, 40.0, 0.1);
-        let belt = Plane {
+        let belt = RigidPlane {
             friction: mu,
             stiffness,
             displacement: [0.2, 0.0],
-            ..Plane::new([0.0, deep], [0.0, 1.0])
+            ..RigidPlane::new([0.0, deep], [0.0, 1.0])
         };
         let contact = beside(bonds, 0.0, vec![belt]);
         let factors: Vec<f64> = (1..=steps).map(|step| f64::from(step) / f64::from(steps)).collect();
@@ -234,7 +234,7 @@ fn strip_pulled_forth_and_back() {
         // a penalty ten times the bonds', and μN = 1/n of the unit for each particle
         let (mu, stiffness) = (0.5, 60.0 * MODULUS);
         let deep = unit / count as f64 / (mu * stiffness);
-        let floor = Plane { friction: mu, stiffness, ..Plane::new([0.0, deep], [0.0, 1.0]) };
+        let floor = RigidPlane { friction: mu, stiffness, ..RigidPlane::new([0.0, deep], [0.0, 1.0]) };
         let contact = beside(bonds, 0.0, vec![floor]);
         let factors: Vec<f64> =
             leg(0.0, 1.0, steps).chain(leg(1.0, -1.0, 2 * steps)).chain(leg(-1.0, 1.0, 2 * steps)).collect();
@@ -266,7 +266,7 @@ fn spring_over_a_plane() {
             let mut built = Body::<2>::solid([2, 1], 1.0, 1.015).build();
             let bonds = &mut built.lattice;
             let loads = hold(bonds, |x| Some(if x[0] < 1.0 { (3, [far, 0.0]) } else { (2, [0.0; 2]) }));
-            let plane = Plane { friction: mu, stiffness, ..Plane::new([0.0, deep], [0.0, 1.0]) };
+            let plane = RigidPlane { friction: mu, stiffness, ..RigidPlane::new([0.0, deep], [0.0, 1.0]) };
             let contact = beside(bonds, 0.0, vec![plane]);
             let (state, _) = equilibria(method, bonds, &loads, contact, &factors[..last], None).unwrap();
             let (mut pulled, mut before) = (0.0_f64, 0.0);
@@ -295,8 +295,8 @@ fn plane_hits_a_particle() {
     for moves in [false, true] {
         // by its own velocity, or with the load factor, over 1 s
         let (velocity, displacement) = if moves { ([0.5, 0.0], [0.0; 2]) } else { ([0.0; 2], [0.5, 0.0]) };
-        let plane = Plane { velocity, displacement, ..Plane::new([-0.1, 0.0], [1.0, 0.0]) };
-        let contact = beside(&one, 0.0, vec![Plane { stiffness: 2e3, ..plane }]);
+        let plane = RigidPlane { velocity, displacement, ..RigidPlane::new([-0.1, 0.0], [1.0, 0.0]) };
+        let contact = beside(&one, 0.0, vec![RigidPlane { stiffness: 2e3, ..plane }]);
         let mut state = State::new(one.sites());
         let solver = VelocityVerlet {
             time_step: Some(1e-4),
@@ -417,11 +417,11 @@ fn neither_threads_nor_restarts_change_a_bit() {
             let mut built = body.build();
             let bonds = &mut built.lattice;
             let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
-            let plane = Plane {
+            let plane = RigidPlane {
                 friction: friction.unwrap_or(0.0),
                 velocity: [0.5, 0.1],
                 stiffness: 30.0,
-                ..Plane::new([0.0; 2], [0.0, 1.0])
+                ..RigidPlane::new([0.0; 2], [0.0, 1.0])
             };
             let mut contact = beside(bonds, SHORT_RANGE, vec![plane]);
             if let Some(friction) = friction {
@@ -482,7 +482,7 @@ fn row_on_a_plane() {
             let loads = hold(bonds, |x| (x[1] > 4.0).then_some((3, [0.0, top])));
             let law = Law::Linear.build(1.0, 1.0, false).unwrap();
             let displacement = if by_plane { [0.0, 0.2] } else { [0.0; 2] };
-            let plane = Plane { stiffness, displacement, ..Plane::new([0.0; 2], [0.0, 2.0]) };
+            let plane = RigidPlane { stiffness, displacement, ..RigidPlane::new([0.0; 2], [0.0, 2.0]) };
             let contact = beside(bonds, 0.0, vec![plane]);
             let factors = [0.25, 0.5, 1.0];
             let mut system = System::new(bonds, BondMaterial::new(&*law, MODULUS), &loads, &factors);
@@ -532,7 +532,8 @@ fn dragged_over_a_plane() {
             let mut built = body.build();
             let bonds = &mut built.lattice;
             let loads = hold(bonds, |x| (x[1] > 6.0).then_some((3, [2.0, -0.6])));
-            let plane = Plane { friction: 0.1, stiffness: 30.0, ..Plane::new([0.0; 2], [0.0, 1.0]) };
+            let plane =
+                RigidPlane { friction: 0.1, stiffness: 30.0, ..RigidPlane::new([0.0; 2], [0.0, 1.0]) };
             let contact = beside(bonds, SHORT_RANGE, vec![plane]).with_friction(0.4, None).unwrap();
             let factors = [0.25, 0.5, 0.75, 1.0];
             equilibria(method, bonds, &loads, contact, &factors, from).unwrap()
@@ -555,31 +556,31 @@ fn dragged_over_a_plane() {
     }
 }
 
-/// What planes and friction are not.
+/// Invalid planes and friction parameters are refused.
 #[test]
 fn refuses() {
     let one = Body::<2>::solid([1, 1], 1.0, 3.015).build().lattice;
     let contact = || Contact::short_range(&one, MODULUS, SHORT_RANGE).unwrap();
-    let good = Plane::new([0.0; 2], [0.0, 1.0]);
-    let fault = |plane: Plane<2>| {
-        let planes = contact().with_planes(&one, &Surface::default(), 1.0, vec![plane]);
+    let good = RigidPlane::new([0.0; 2], [0.0, 1.0]);
+    let fault = |plane: RigidPlane<2>| {
+        let planes = contact().with_planes(&one, &BodySurface::default(), 1.0, vec![plane]);
         planes.err().map(|error| error.to_string())
     };
     assert_eq!(fault(good), None);
     for (plane, what) in [
-        (Plane { normal: [0.0; 2], ..good }, "normal of a plane: found 0"),
-        (Plane { normal: [f64::NAN, 1.0], ..good }, "normal of a plane: found NaN"),
-        (Plane { stiffness: -1.0, ..good }, "stiffness of a plane: found -1"),
-        (Plane { friction: f64::INFINITY, ..good }, "friction of a plane: found inf"),
-        (Plane { velocity: [f64::NAN; 2], ..good }, "velocity of a plane: found NaN"),
-        (Plane { elastic_slip: Some(0.0), ..good }, "elastic slip of a plane: found 0"),
+        (RigidPlane { normal: [0.0; 2], ..good }, "normal of a plane: found 0"),
+        (RigidPlane { normal: [f64::NAN, 1.0], ..good }, "normal of a plane: found NaN"),
+        (RigidPlane { stiffness: -1.0, ..good }, "stiffness of a plane: found -1"),
+        (RigidPlane { friction: f64::INFINITY, ..good }, "friction of a plane: found inf"),
+        (RigidPlane { velocity: [f64::NAN; 2], ..good }, "velocity of a plane: found NaN"),
+        (RigidPlane { elastic_slip: Some(0.0), ..good }, "elastic slip of a plane: found 0"),
     ] {
         assert!(fault(plane).unwrap().starts_with(what), "{what}");
     }
     assert!(contact().with_friction(-0.1, None).is_err() && contact().with_friction(0.1, Some(0.0)).is_err());
-    let slack = contact().with_planes(&one, &Surface::default(), 0.0, vec![good]).err().unwrap();
+    let slack = contact().with_planes(&one, &BodySurface::default(), 0.0, vec![good]).err().unwrap();
     assert!(slack.to_string().starts_with("modulus of contact: found 0"), "{slack}");
-    let far = Plane { bonded: true, ..Plane::new([0.0, -3.0], [0.0, 1.0]) };
+    let far = RigidPlane { bonded: true, ..RigidPlane::new([0.0, -3.0], [0.0, 1.0]) };
     assert!(fault(far).unwrap().contains("no face of the body within half a spacing"));
 }
 
@@ -589,7 +590,7 @@ fn refuses() {
 fn plane_through_a_body() {
     let mut built = Body::<2>::solid([12, 12], 1.0, 3.015).build();
     let bonds = &mut built.lattice;
-    let plane = Plane { friction: 0.5, stiffness: 5.0, ..Plane::new([0.0, 6.0], [0.0, 1.0]) };
+    let plane = RigidPlane { friction: 0.5, stiffness: 5.0, ..RigidPlane::new([0.0, 6.0], [0.0, 1.0]) };
     let contact = beside(bonds, SHORT_RANGE, vec![plane]).with_friction(0.5, None).unwrap();
     let mut state = State::new(bonds.sites());
     let solver = VelocityVerlet { records: 5, ..VelocityVerlet::new(DENSITY, 20.0) };

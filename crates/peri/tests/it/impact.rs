@@ -79,9 +79,9 @@ fn two_particles_rebound() {
     assert!(errors[3] < 1e-3 * 1.2, "{errors:?}");
 }
 
-/// What bars of `bars` particles in a row do to each other: the velocities of their centres over that of the
-/// first, and the state. Horizon Δ, so that each bar is a chain of springs 6kθV²/Δ; it hits the next at a
-/// hundredth of its wave speed.
+/// Collides bars of `bars` particles in a row: the velocities of their centres over that of the first, and
+/// the state. Horizon Δ, so that each bar is a chain of springs 6kθV²/Δ; it hits the next at a hundredth of
+/// its wave speed.
 fn cradle(bars: usize, particles: usize, safety: f64, kappa: f64) -> (Vec<f64>, State<2>) {
     let count = bars * particles;
     let mut body = Body::<2>::solid([1, count], 1.0, 1.015);
@@ -110,7 +110,7 @@ fn cradle(bars: usize, particles: usize, safety: f64, kappa: f64) -> (Vec<f64>, 
 }
 
 fn energy_error(state: &State<2>) -> f64 {
-    let off = |row: &peri::solver::Record| ((row.kinetic + row.stored) / row.work - 1.0).abs();
+    let off = |row: &peri::solver::StepRecord| ((row.kinetic + row.stored) / row.work - 1.0).abs();
     state.history.iter().map(off).fold(0.0, f64::max)
 }
 

@@ -107,7 +107,8 @@ fn plate_with_a_hole() {
         let slow = problem.relaxed(&mut plate.bonds, 1e-5);
         let ratio = slow.counts.bond_evaluations as f64 / fast.counts.bond_evaluations as f64;
         eprintln!(
-            "plate, dx = {spacing}: {} and {} force evaluations, a factor of {ratio:.1}; {middle:.2} and {:.2} s",
+            "plate, dx = {spacing}: {} and {} force evaluations, a factor of {ratio:.1}; {middle:.2} and \
+            {:.2} s",
             fast.counts.evaluations,
             slow.counts.evaluations,
             start.elapsed().as_secs_f64() - middle
@@ -338,8 +339,8 @@ fn past_the_greatest_force() {
     assert!(stretch > 1.6 && state.convergence.residual <= 1e-4, "{stretch} {}", state.convergence.residual);
 }
 
-/// As dynamic relaxation in `limits.rs`: one particle, two, all constrained, a load that nothing bears,
-/// numbers that are none.
+/// Smallest bodies, as for dynamic relaxation in `limits.rs`: one particle, two, all constrained, a load
+/// without support, values that are not numbers.
 #[test]
 fn smallest_bodies_and_errors() {
     let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();

@@ -364,8 +364,8 @@ fn strong_compression_of_the_network_law() {
     }
 }
 
-/// One step to four times the length ends where four steps end, though its first stretches lie far outside
-/// the range that the law is first fitted for.
+/// A single step to four times the length ends where four steps end, though its first stretches lie far
+/// outside the range of the first fit.
 #[test]
 fn a_leap_ends_where_steps_end() {
     let law = Law::ChainOffset.build(100.0, 1200.0, true).unwrap();

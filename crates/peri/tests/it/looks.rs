@@ -79,8 +79,10 @@ displacement_field = [\"0.02*x\", \"-0.01*y\"]\n",
             min[0], min[1], max[0], max[1]
         );
     }
-    scene += "[solver]\ntolerance = 1e-10\n[[probe]]\nname = \"along\"\ntrack = \"strain\"\nfrom = [\"31 mm\", \"1 mm\"]\nto = [\"51 mm\", \"1 mm\"]
-[[probe]]\nname = \"across\"\ntrack = \"strain\"\nfrom = [\"41 mm\", \"-5 mm\"]\nto = [\"41 mm\", \"5 mm\"]\n";
+    scene += "[solver]\ntolerance = 1e-10\n[[probe]]\nname = \"along\"\ntrack = \"strain\"\n\
+    from = [\"31 mm\", \"1 mm\"]\nto = [\"51 mm\", \"1 mm\"]
+[[probe]]\nname = \"across\"\ntrack = \"strain\"\nfrom = [\"41 mm\", \"-5 mm\"]\n\
+        to = [\"41 mm\", \"5 mm\"]\n";
     let finished = solve(&scene, directory.path());
     assert!((value(&finished, "along") / 0.02 - 1.0).abs() < 1e-8);
     assert!((value(&finished, "across") / -0.01 - 1.0).abs() < 1e-8);
@@ -91,8 +93,10 @@ displacement_field = [\"0.02*x\", \"-0.01*y\"]\n",
 fn loads_follow_a_factor() {
     let directory = tempfile::tempdir().unwrap();
     let scene = format!(
-        "{SHEET}\n[[boundary]]\nname = \"all\"\nmin = [\"0 mm\", \"-20 mm\"]\nmax = [\"80 mm\", \"20 mm\"]\ndisplacement = [\"2 mm\", \"0 mm\"]
-[solver]\nmethod = \"verlet\"\n[dynamics]\ndensity = \"1 g/cm^3\"\nend_time = \"3 ms\"\nrecords = 3\nfactor = \"sin(pi*t/4e-3)\"
+        "{SHEET}\n[[boundary]]\nname = \"all\"\nmin = [\"0 mm\", \"-20 mm\"]\nmax = [\"80 mm\", \"20 mm\"]\n\
+        displacement = [\"2 mm\", \"0 mm\"]
+[solver]\nmethod = \"verlet\"\n[dynamics]\ndensity = \"1 g/cm^3\"\nend_time = \"3 ms\"\nrecords = 3\n\
+        factor = \"sin(pi*t/4e-3)\"
 [[probe]]\nname = \"all\"\ntrack = \"displacement\"\naxis = \"x\"\n"
     );
     let finished = solve(&scene, directory.path());
@@ -116,7 +120,8 @@ fn a_grid_is_a_box() {
         let from = SHEET.find("spacing").unwrap();
         let to = SHEET.find("[material]").unwrap();
         format!(
-            "{}horizon = \"6.03 mm\"\ngrid = {{ min = [\"0 mm\", \"-20 mm\"], max = [\"80 mm\", \"20 mm\"], cells = {cells} }}\n{}{ends}",
+            "{}horizon = \"6.03 mm\"\ngrid = {{ min = [\"0 mm\", \"-20 mm\"], max = [\"80 mm\", \"20 mm\"], \
+            cells = {cells} }}\n{}{ends}",
             &SHEET[..from],
             &SHEET[to..]
         )
@@ -142,7 +147,7 @@ fn a_tip_runs_through() {
     assert!(!notes.contains("nothing broke") && !notes.contains("warning"), "{notes}");
 }
 
-/// What is most likely not meant is said.
+/// Scenes that are probably not intended give a warning.
 #[test]
 fn what_is_most_likely_not_meant() {
     let directory = tempfile::tempdir().unwrap();
@@ -194,9 +199,12 @@ fn what_is_most_likely_not_meant() {
         (0..200).map(|k| format!("{}e-3,{}e-3,4e-6\n", 2 * (k % 20), 2 * (k / 20))).collect();
     std::fs::write(directory.path().join("points.csv"), format!("x,y,volume\n{points}")).unwrap();
     let cloud = format!(
-        "version = 1\nprogram = \"peri\"\n[body]\nspace = \"plane-stress\"\nthickness = \"1 mm\"\nhorizon = \"6 mm\"\npoints = \"{}\"
-[material]\nyoungs_modulus = \"1 MPa\"\nlaw = \"linear\"\n[[boundary]]\nside = \"x-\"\nlayers = 1\ndisplacement = [\"0 mm\", \"0 mm\"]
-[[boundary]]\nmin = [\"37 mm\", \"-1 mm\"]\nmax = [\"39 mm\", \"30 mm\"]\ndisplacement = [\"1 mm\", \"0 mm\"]\n",
+        "version = 1\nprogram = \"peri\"\n[body]\nspace = \"plane-stress\"\nthickness = \"1 mm\"\n\
+        horizon = \"6 mm\"\npoints = \"{}\"
+[material]\nyoungs_modulus = \"1 MPa\"\nlaw = \"linear\"\n[[boundary]]\nside = \"x-\"\nlayers = 1\n\
+        displacement = [\"0 mm\", \"0 mm\"]
+[[boundary]]\nmin = [\"37 mm\", \"-1 mm\"]\nmax = [\"39 mm\", \"30 mm\"]\n\
+        displacement = [\"1 mm\", \"0 mm\"]\n",
         directory.path().join("points.csv").display()
     );
     let output = tempfile::tempdir().unwrap();
@@ -298,7 +306,8 @@ fn examples_of_the_guide_read_the_last_step() {
     let (head, tail) = SHEET.split_once("[output]").unwrap();
     assert!(tail.contains("fields = false"));
     let scene = format!(
-        "{}{fields}[[boundary]]\nside = \"x-\"\ndisplacement = [\"0 mm\", \"0 mm\"]\n[[boundary]]\nside = \"x+\"\ndisplacement = [\"6 mm\", \"0 mm\"]\n[solver]\nsteps = 3\n",
+        "{}{fields}[[boundary]]\nside = \"x-\"\ndisplacement = [\"0 mm\", \"0 mm\"]\n[[boundary]]\n\
+        side = \"x+\"\ndisplacement = [\"6 mm\", \"0 mm\"]\n[solver]\nsteps = 3\n",
         head.replace("\"2 mm\"", "\"5 mm\"")
             .replace("\"0 mm\"", "\"-40 mm\"")
             .replace("\"80 mm\"", "\"40 mm\"")
@@ -331,7 +340,8 @@ fn examples_of_the_guide_read_the_last_step() {
         assert!(fence.contains(&format!("import {module}")));
         if !has(module) {
             eprintln!(
-                "skipped: {python} has no {module} (`pip install {module}`, or name a Python with it in POLY_VTK_PYTHON)"
+                "skipped: {python} has no {module} (`pip install {module}`, or name a Python with it in \
+                POLY_VTK_PYTHON)"
             );
             continue;
         }

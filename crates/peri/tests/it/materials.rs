@@ -1,4 +1,4 @@
-//! One battery for every material: the five bond laws, by their kernels and by plain loops, and a state-based
+//! A battery for every material: the five bond laws, by their kernels and by plain loops, and a state-based
 //! material from outside of the crate.
 
 use crate::bodies::{Body, Built, MODULUS, Random, laws, scatter};
@@ -6,19 +6,19 @@ use crate::linear_solid::{LinearSolid, poisson_ratio};
 use evidence::near;
 use peri::bonds::{BodyGeometry, Bonds, Overstretched};
 use peri::field::Field;
-use peri::material::{BondMaterial, LawCover, Material, Pointwise, Response};
+use peri::material::{BondMaterial, LawCover, Material, Pointwise, SolverMaterial};
 use peri::solver::{
     Breaking, DynamicRelaxation, Lbfgs, Method, Policy, State, Status, System, VelocityVerlet,
 };
 
-/// Makes a material at work in a body.
-pub type Make<'m, const D: usize> = &'m dyn Fn(&dyn Bonds<D>) -> Box<dyn Response<D> + 'm>;
+/// Makes a material ready for solvers in a body.
+pub type Make<'m, const D: usize> = &'m dyn Fn(&dyn Bonds<D>) -> Box<dyn SolverMaterial<D> + 'm>;
 
-/// Bonds, a material at work in them, and where they are.
+/// Bonds, a material in them, and their displacement.
 struct Case<'a, 'm, const D: usize> {
     name: String,
     bonds: &'a mut dyn Bonds<D>,
-    material: Box<dyn Response<D> + 'm>,
+    material: Box<dyn SolverMaterial<D> + 'm>,
     displacement: Field<D>,
 }
 
@@ -189,7 +189,7 @@ impl<'a, 'm, const D: usize> Case<'a, 'm, D> {
             });
         }
         assert!(!list.is_empty());
-        self.bonds.sever(&list);
+        self.bonds.break_bonds(&list);
         let at = self.displacement.clone();
         let before = self.forces(&at);
         let away = self.moved(lone, 0, 0.3 * self.bonds.spacing());
@@ -330,7 +330,7 @@ fn the_linear_solid_has_its_bulk_modulus() {
     near("linear_solid_energy_space", density::<3>([5, 5, 4]), exact(3.0), 1e-12 * exact(3.0));
 }
 
-/// What the example prints: Poisson ratios that no bond law has. Along an axis the lattice's sums shear r
+/// Checks the example's output: Poisson ratios that no bond law has. Along an axis the lattice's sums shear r
 /// times as stiffly as the continuum, r = 2Σ(x² − y²)²/|ξ|² / Σ|ξ|²: (K − rμ)/(K + rμ) up to the free edges,
 /// whose families miss a side.
 #[test]
@@ -347,7 +347,7 @@ fn the_linear_solid_has_its_poisson_ratio() {
     }
 }
 
-/// How a plate is pulled.
+/// Method that pulls a plate.
 #[derive(Clone, Copy)]
 enum Scheme {
     Relaxation,

@@ -1,5 +1,5 @@
-//! Bodies of several parts, slots, cracks of several facets, weak layers: who is bonded to whom, and at which
-//! load they part.
+//! Bodies of several parts, slots, cracks of several facets, weak layers: their bonds, and the loads at which
+//! they separate.
 
 use harness::case::{Case, Options, Run};
 use harness::output::vtkhdf;
@@ -254,7 +254,8 @@ fn weak_layers_break_at_their_own_strength() {
     let weak = |x: f64, width: f64, stretch: f64| {
         let end = x + width;
         format!(
-            "{{ shape = {{ add = \"box\", min = [\"{x} mm\", \"-5 mm\"], max = [\"{end} mm\", \"5 mm\"] }}, critical = {{ stretch = {stretch} }} }}"
+            "{{ shape = {{ add = \"box\", min = [\"{x} mm\", \"-5 mm\"], max = [\"{end} mm\", \"5 mm\"] }}, \
+            critical = {{ stretch = {stretch} }} }}"
         )
     };
     let layers = [
@@ -312,7 +313,7 @@ fn facets_meet() {
     assert!(told.contains("warning    body.cracks[0] misses body.cracks[1] by"), "{told}");
 }
 
-/// In the plane: ends that meet within a thousandth of the spacing, that miss each other, and that stop
+/// Plane cracks: ends that meet within a thousandth of the spacing, that miss each other, and that stop
 /// before the surface.
 #[test]
 fn segments_meet() {
@@ -341,7 +342,8 @@ displacement = ["0 mm", "1 mm"]
     };
     let two = |x: f64, y: f64| {
         strip(&format!(
-            "{{ from = [\"-1 mm\", \"10 mm\"], to = [\"5 mm\", \"10.2 mm\"] }}, {{ from = [\"{x} mm\", \"{y} mm\"], to = [\"11 mm\", \"9.9 mm\"] }}"
+            "{{ from = [\"-1 mm\", \"10 mm\"], to = [\"5 mm\", \"10.2 mm\"] }}, {{ from = [\"{x} mm\", \
+            \"{y} mm\"], to = [\"11 mm\", \"9.9 mm\"] }}"
         ))
     };
     for (x, y) in [(5.0, 10.2), (5.0003, 10.2), (5.0, 10.2003), (4.9997, 10.1997)] {

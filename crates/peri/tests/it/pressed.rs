@@ -21,7 +21,7 @@ struct Run<'a, const D: usize> {
 }
 
 impl<const D: usize> Run<'_, D> {
-    /// How often the list was made.
+    /// Number of rebuilds of the list.
     fn solve(
         self,
         method: &mut dyn Equilibrium<D>,
@@ -51,7 +51,7 @@ fn methods<const D: usize>(tolerance: f64) -> [Box<dyn Equilibrium<D>>; 2] {
     [Box::new(RelaxationSolver::new(relaxation)), Box::new(LbfgsSolver::new(memory))]
 }
 
-/// What touches in the last step.
+/// Contacts in the last step.
 fn touching<const D: usize>(state: &State<D>) -> ContactSummary {
     state.history.last().unwrap().contact.unwrap()
 }
@@ -263,8 +263,8 @@ fn neither_threads_nor_lists_nor_restarts_change_a_bit() {
     }
 }
 
-/// Where nothing touches, contact changes no bit, a mere look at what does never does, and none is built
-/// unless requested.
+/// Checks that contact changes no bit without touch, that measuring overlaps never does, and that none is
+/// built unless requested.
 #[test]
 fn contact_without_touch_changes_no_bit() {
     let solve = |which: usize, contact: Option<[f64; 2]>| {

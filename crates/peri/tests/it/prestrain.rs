@@ -6,7 +6,7 @@ use evidence::near;
 use peri::bonds::{BodyGeometry, Bonds, StretchScan};
 use peri::calibrate::modulus_in;
 use peri::field::Field;
-use peri::material::{BondMaterial, Material, Pointwise, Prestrained, Response};
+use peri::material::{BondMaterial, Material, Pointwise, Prestrained, SolverMaterial};
 use peri::potential::LinearBond;
 use peri::solver::{Lbfgs, Loads, Method, State, System};
 
@@ -87,7 +87,7 @@ fn a_free_body_is_free_of_stress() {
     }
 }
 
-/// What every material satisfies, with a prestrain that varies from particle to particle.
+/// Checks that every material satisfies, with a prestrain that varies from particle to particle.
 #[test]
 fn prestrained_bonds_pass() {
     fn strains<const D: usize>(sites: usize) -> Vec<[[f64; D]; D]> {

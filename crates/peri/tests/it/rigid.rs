@@ -12,7 +12,7 @@ use peri::solver::{
 
 const WAY: [f64; 2] = [0.3, 1.0];
 
-/// Both methods.
+/// Quasi-static methods.
 fn methods(tolerance: f64) -> [(&'static str, Box<dyn Equilibrium<2>>); 2] {
     let max_iterations = 5000;
     let plain = DynamicRelaxation { tolerance, max_iterations, ..Default::default() };
@@ -67,8 +67,9 @@ fn a_body_moved_by_one_grip() {
     }
 }
 
-/// From a start in which the grip has torn away from the rest: the answer is as near to a rigid motion as the
-/// tolerance says, where reactions alone as a reference leave it 15 to 36 % away at 1e-3, or never end.
+/// Starts from a state in which the grip has torn away from the rest: the result is as near to a rigid motion
+/// as the tolerance, whereas reactions alone as a reference leave it 15 to 36 % away at 1e-3, or never
+/// converge.
 #[test]
 fn a_strained_start_comes_to_rest() {
     for (tolerance, most) in [(1e-3, 0.02), (1e-6, 2e-5)] {

@@ -77,7 +77,8 @@ fn a_bar_twisted_along_the_arc() {
     let slice = |name: &str, z: f64| {
         let (low, high) = (z - 0.5, z + 0.5);
         format!(
-            "[[probe]]\nname = \"{name}\"\ntrack = \"rotation\"\naxis = \"z\"\nmin = [\"-6 mm\", \"-6 mm\", \"{low} mm\"]\nmax = [\"6 mm\", \"6 mm\", \"{high} mm\"]\n"
+            "[[probe]]\nname = \"{name}\"\ntrack = \"rotation\"\naxis = \"z\"\n\
+            min = [\"-6 mm\", \"-6 mm\", \"{low} mm\"]\nmax = [\"6 mm\", \"6 mm\", \"{high} mm\"]\n"
         )
     };
     let twisted = solve(&(bar(turn, 4) + &slice("low", -5.5) + &slice("high", 5.5)));
@@ -176,8 +177,8 @@ fn a_bushing_turned_in_its_plane() {
     assert!(least < moment && moment < most, "{moment} N m, {least} to {most}");
 }
 
-/// In motion: the grip is where the factor puts it, and energy is conserved: work = kinetic + stored but for
-/// O(Δt²), a quarter of which half the time step leaves.
+/// Dynamic rotation: the grip follows the factor, and energy is conserved: work = kinetic + stored up to
+/// O(Δt²), a quarter of which remains with half the time step.
 #[test]
 fn a_strip_swung_by_its_grip() {
     let turn = Rotation { centre: [0.0; 2], axis: [0.0, 0.0, 1.0], angle: FRAC_PI_2 };
@@ -194,7 +195,7 @@ fn a_strip_swung_by_its_grip() {
         // it bends a little while it swings
         let range = stretch_range(&simulation.bonds, &simulation.state.displacement);
         assert!(range.low > -0.2 && range.high < 0.2, "{range:?}");
-        let of = |record: &peri::solver::Record| {
+        let of = |record: &peri::solver::StepRecord| {
             (record.kinetic + record.stored - record.work).abs() / record.work
         };
         simulation.history().iter().map(of).fold(0.0, f64::max)
@@ -203,7 +204,7 @@ fn a_strip_swung_by_its_grip() {
     assert!(coarse < 0.01 && (3.0..5.0).contains(&(coarse / fine)), "{coarse} {fine}");
 }
 
-/// A field of the same turn along the chord gives a warning.
+/// A field of the same rotation along the chord gives a warning.
 #[test]
 fn chords_are_told() {
     let chord = "displacement_field = [\"-0.5*x - 0.866025404*y\", \"0.866025404*x - 0.5*y\", \"0\"]";

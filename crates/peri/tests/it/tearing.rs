@@ -101,8 +101,9 @@ fn context<'a>(law: &'a dyn BondPotential, bonds: &LatticeBonds<2>, youngs: f64)
     }
 }
 
-/// Of a linear law λ_c − 1 goes with √G: by `bonds` it is that of Silling and Askari (√(4πG/(9Eδ)) in plane
-/// stress), by `tearing` √c times smaller; by `softening` the energy is e_f times that up to the onset.
+/// Critical stretches of a linear law: λ_c − 1 is proportional to √G: by `bonds` it is that of Silling and
+/// Askari (√(4πG/(9Eδ)) in plane stress), by `tearing` √c times smaller; by `softening` the energy is e_f
+/// times that up to the onset.
 #[test]
 fn critical_stretches_of_the_conventions() {
     let law = Law::Linear.build(0.0, 0.0, false).unwrap();
@@ -123,7 +124,7 @@ fn critical_stretches_of_the_conventions() {
     near("softening_energy", fracture_energy(&context, Convention::Softening, end) / 80.0, 1.0, 1e-9);
 }
 
-/// By `bonds` the critical stretch has the bits that it had before there were conventions
+/// Compares the critical stretch by `bonds` with its bits before there were conventions
 /// (pure-shear-bond-law.toml of the inputs, run by that build).
 #[test]
 fn bonds_are_what_they_were() {
@@ -217,7 +218,7 @@ fn part<const D: usize>(bonds: &mut dyn Bonds<D>, n: [f64; D], at: f64) {
             }
         });
     }
-    bonds.sever(&list);
+    bonds.break_bonds(&list);
 }
 
 /// The area of a plane crack through a body: along an axis all but the half diagonals that miss at both ends,
@@ -238,11 +239,11 @@ fn areas_of_cracks() {
     let mut bonds = built();
     let crossing = Crossing::new::<2>(&bonds, None);
     let area = CrackArea::new::<2>(&bonds, &crossing);
-    assert_eq!(area.of::<2>(&bonds), 0.0);
+    assert_eq!(area.area::<2>(&bonds), 0.0);
     part(&mut bonds, [0.0, 1.0], 8.0);
     let diagonal = 2.0 / 2f64.sqrt();
     let exact = 0.5 * (columns + (columns - 1.0) * diagonal) / (1.0 + diagonal);
-    near("crack_area_axis", area.of::<2>(&bonds), exact, 1e-12);
+    near("crack_area_axis", area.area::<2>(&bonds), exact, 1e-12);
     // some bonds beside a crack are none
     let mut beside = built();
     let mut list = Vec::new();
@@ -259,8 +260,8 @@ fn areas_of_cracks() {
             }));
         }
     });
-    beside.sever(&list);
-    assert_eq!(area.of::<2>(&beside), 0.0);
+    beside.break_bonds(&list);
+    assert_eq!(area.area::<2>(&beside), 0.0);
     // a lattice turned by 45°, as a cloud
     let turned = 0.5_f64.sqrt();
     let grid = (-40..40).flat_map(|i| (-40..40).map(move |j| [f64::from(i), f64::from(j) + 0.5]));
@@ -272,17 +273,17 @@ fn areas_of_cracks() {
     let mut cloud = CloudBonds::new(&points, &volumes, 0.5, 3.015, VolumeCorrection::None, &[]).unwrap();
     let area = CrackArea::new::<2>(&cloud, &Crossing::new::<2>(&cloud, None));
     part(&mut cloud, [0.0, 1.0], 8.0);
-    near("crack_area_45_degrees", area.of::<2>(&cloud) / 20.0, 1.0, 0.03);
+    near("crack_area_45_degrees", area.area::<2>(&cloud) / 20.0, 1.0, 0.03);
     let mut solid = block(2.015, 7.0);
     let area = CrackArea::new::<3>(&solid, &Crossing::new::<3>(&solid, None));
     part(&mut solid, [0.0, 1.0, 0.0], 3.0);
     // of 7 × 7 cells the diagonals at the rim are missing
     let (d, e) = (4.0 / 2f64.sqrt(), 4.0 / 3f64.sqrt());
     let exact = (49.0 + d * 42.0 + e * 36.0) / (1.0 + d + e);
-    near("crack_area_solid", area.of::<3>(&solid), exact, 1e-12);
+    near("crack_area_solid", area.area::<3>(&solid), exact, 1e-12);
 }
 
-/// What `peri check` says of a scene.
+/// Output of `peri check` for a scene.
 fn told(text: &str, folder: &Path) -> String {
     let source = Source::new(folder.join("scene.toml"), text);
     let scene = source.parse::<Scene>().unwrap_or_else(|error| panic!("{}", error.render()));
@@ -330,8 +331,16 @@ fn causes_of_other_energies_are_named() {
     let slab = STRIP
         .replace("plane-stress", "solid")
         .replace("thickness = \"1 mm\"\n", "")
-        .replace("\"-12 mm\"], max = [\"80 mm\", \"12 mm\"]", "\"-12 mm\", \"0 mm\"], max = [\"80 mm\", \"12 mm\", \"6 mm\"]")
-        .replace("from = [\"-1 mm\", \"0 mm\"], to = [\"40 mm\", \"0 mm\"]", "from = [\"-1 mm\", \"0 mm\", \"-1 mm\"], to = [\"40 mm\", \"0 mm\", \"-1 mm\"], and = [\"-1 mm\", \"0 mm\", \"7 mm\"]")
+        .replace(
+            "\"-12 mm\"], max = [\"80 mm\", \"12 mm\"]",
+            "\"-12 mm\", \"0 mm\"], max = [\"80 mm\", \
+        \"12 mm\", \"6 mm\"]",
+        )
+        .replace(
+            "from = [\"-1 mm\", \"0 mm\"], to = [\"40 mm\", \"0 mm\"]",
+            "from = [\"-1 mm\", \"0 mm\", \
+        \"-1 mm\"], to = [\"40 mm\", \"0 mm\", \"-1 mm\"], and = [\"-1 mm\", \"0 mm\", \"7 mm\"]",
+        )
         .replace("[\"0 mm\", \"0 mm\"]", "[\"0 mm\", \"0 mm\", \"free\"]")
         .replace("[\"0 mm\", \"0.4 mm\"]", "[\"0 mm\", \"0.4 mm\", \"free\"]");
     for (scene, cause) in [

@@ -99,8 +99,8 @@ fn bytes_per_particle() {
     check([100, 100, 100], 130.0);
 }
 
-/// One force evaluation an iteration and one a step, where balance is found; the stretches of its start and
-/// its end take no forces.
+/// Counts force evaluations: one per iteration and one per step, where balance is found; the stretches of its
+/// start and its end take no forces.
 #[test]
 fn force_evaluations() {
     let mut built = Body::<2>::damaged([24, 20], 0.1, 3.015).build();

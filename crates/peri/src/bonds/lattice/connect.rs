@@ -2,7 +2,7 @@
 
 use super::LatticeBonds;
 use crate::bonds::BodyGeometry;
-use crate::bonds::lattice_kernel::{Class, TILE};
+use crate::bonds::lattice_kernel::{TILE, TileClass};
 use crate::field::{CHUNK, chunk_range};
 use crate::geometry::{Cut, Gaps, cuts_within, severed};
 use rayon::prelude::*;
@@ -65,14 +65,14 @@ impl<const D: usize> LatticeBonds<D> {
         let class = |tile: usize| {
             let mut range = tile * TILE..(tile + 1) * TILE;
             if range.clone().all(|s| intact.iter().all(|w| w[s] == 0)) {
-                Class::Empty
+                TileClass::Empty
             } else if range.start >= guard
                 && range.end + guard <= sites
                 && range.all(|s| intact.iter().zip(&full).all(|(w, f)| w[s] == *f) && uniform(s))
             {
-                Class::Full
+                TileClass::Full
             } else {
-                Class::Partial
+                TileClass::Partial
             }
         };
         let classes = (0..sites / TILE).into_par_iter().map(class).collect();

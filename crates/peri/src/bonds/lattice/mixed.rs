@@ -34,7 +34,7 @@ impl<const D: usize> Mixed<D> {
         self.factors = Some(factors.components().map(single));
     }
 
-    pub(super) fn round(&mut self, displacement: &Field<D>, spacing: f64) {
+    pub(super) fn set_displacement(&mut self, displacement: &Field<D>, spacing: f64) {
         let inverse = 1.0 / spacing;
         for (rounded, exact) in self.displacement.iter_mut().zip(displacement.components()) {
             rounded.par_chunks_mut(CHUNK).zip(exact.par_chunks(CHUNK)).for_each(|(rounded, exact)| {

@@ -5,7 +5,7 @@ use super::outcome::VariantOutcome;
 use super::outcome::families;
 use crate::exact;
 use crate::program::scene::{ExactSpec, Scene};
-use crate::stress::Measure;
+use crate::stress::StressMethod;
 use harness::output::csv;
 use harness::output::picture::{LegendPlace, LinePlot, Series};
 use polycore::Error;
@@ -35,7 +35,9 @@ pub fn draw_curves(scene: &Scene, outcomes: &[VariantOutcome], output: &Path) ->
     };
     let title = "Stress error of the plate with a hole";
     let mut together = convergence(title);
-    for (index, measure) in stress.measures.iter().enumerate().filter(|(_, m)| **m != Measure::AsPublished) {
+    for (index, measure) in
+        stress.measures.iter().enumerate().filter(|(_, m)| **m != StressMethod::AsPublished)
+    {
         let name = measure.name();
         let mut single = convergence(&format!("{title}, {name}"));
         for (family, members) in &families {

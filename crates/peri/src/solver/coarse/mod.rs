@@ -6,18 +6,18 @@ mod space;
 mod stiffness;
 mod transfer;
 
-pub use stiffness::Survey;
+pub use stiffness::BondCounts;
 
 use crate::bonds::BodyGeometry;
 use crate::field::Field;
 use crate::potential::BondPotential;
 use crate::solver::load::Loads;
-use crate::solver::places::in_order;
+use crate::solver::particle_map::in_order;
 use factor::{Factor, Pattern};
 use polycore::numerics::bounds;
 use pulp::Arch;
 use rayon::prelude::*;
-use space::{CORNERS, NONE, Space};
+use space::{CORNERS, CoarseSpace, NONE};
 use stiffness::{Assembly, ElementMatrix};
 use transfer::{Prolong, Restrict};
 
@@ -30,7 +30,7 @@ const LEAST_DIAGONAL: f64 = 1e-9;
 const BATCH: usize = 64;
 
 /// Body and law of a coarse level.
-pub struct Body<'a, const D: usize> {
+pub struct CoarseBody<'a, const D: usize> {
     /// The bonds.
     pub bonds: &'a dyn BodyGeometry<D>,
     /// Loads, for the constrained components.
@@ -42,13 +42,13 @@ pub struct Body<'a, const D: usize> {
     /// Stiffness density of each site, N/m⁵, that holds constrained components.
     pub springs: &'a [f64],
     /// Counts of the bonds.
-    pub survey: &'a Survey,
+    pub survey: &'a BondCounts,
     /// Faces held by rigid planes.
-    pub anchors: &'a [Anchor<D>],
+    pub anchors: &'a [PlaneAnchor<D>],
 }
 
 /// A face held by a rigid plane.
-pub struct Anchor<const D: usize> {
+pub struct PlaneAnchor<const D: usize> {
     /// Particle at the face: functions hardly change over the particles below it.
     pub site: u32,
     /// Direction in which it is held; `None`: all directions.
@@ -58,8 +58,8 @@ pub struct Anchor<const D: usize> {
 }
 
 /// A factored coarse level.
-pub struct Coarse<const D: usize> {
-    space: Space<D>,
+pub struct CoarseLevel<const D: usize> {
+    space: CoarseSpace<D>,
     factor: Factor,
     /// Index of each particle among the elements' members; [`NONE`] for particles without bonds.
     places: Vec<u32>,
@@ -71,18 +71,18 @@ pub struct Coarse<const D: usize> {
     coefficients: Vec<f64>,
 }
 
-impl<const D: usize> Coarse<D> {
+impl<const D: usize> CoarseLevel<D> {
     /// Builds functions with cells of about `edge` (m), at most `most` degrees of freedom; reuses the
     /// analysis of `old` if possible. `None` if the body is too small or too broken for a coarse level.
-    pub fn new(body: &Body<D>, edge: f64, most: usize, old: Option<Self>) -> Option<Self> {
+    pub fn new(body: &CoarseBody<D>, edge: f64, most: usize, old: Option<Self>) -> Option<Self> {
         // a lattice's particle with every bond has neighbours on all sides; a cloud's may still be at a gap
         let whole = if body.bonds.whole_family().is_some() { body.survey.most } else { u32::MAX };
-        let mut space = Space::new(body.bonds, &body.survey.bonded, whole, edge, most / D)?;
-        let Body { bonds, loads, displacement, law, springs, survey, anchors } = *body;
+        let mut space = CoarseSpace::new(body.bonds, &body.survey.bonded, whole, edge, most / D)?;
+        let CoarseBody { bonds, loads, displacement, law, springs, survey, anchors } = *body;
         let assembly = Assembly::new(bonds, loads, displacement, survey, law, springs, space.edge);
         let mut matrices: Vec<(ElementMatrix, [f64; CORNERS])> =
             space.elements.par_iter().map(|element| assembly.element(&space, element)).collect();
-        hold(&space, anchors, &mut matrices);
+        add_anchors(&space, anchors, &mut matrices);
         let extent = extent(body.bonds);
         let shift = SHIFT * assembly.stiffness() * (std::f64::consts::PI / extent).powi(2);
         let (pattern, blocks) = pattern::<D>(&space);
@@ -117,7 +117,7 @@ impl<const D: usize> Coarse<D> {
         }
         self.factor.solve(&mut self.coefficients);
         let (mut rest, mut at) = (self.moved.components_mut(), 0);
-        let cut = |elements: &'_ [space::Element]| {
+        let cut = |elements: &'_ [space::CoarseElement]| {
             let length = elements.last().map_or(at, |element| element.members[1]) - at;
             at += length;
             rest.each_mut().map(|rest| {
@@ -162,9 +162,9 @@ impl<const D: usize> Coarse<D> {
 }
 
 /// Adds k φ_a φ_b n⊗n of anchors to the matrices of their elements.
-fn hold<const D: usize>(
-    space: &Space<D>,
-    anchors: &[Anchor<D>],
+fn add_anchors<const D: usize>(
+    space: &CoarseSpace<D>,
+    anchors: &[PlaneAnchor<D>],
     matrices: &mut [(ElementMatrix, [f64; CORNERS])],
 ) {
     for anchor in anchors {
@@ -199,12 +199,12 @@ fn extent<const D: usize>(bonds: &dyn BodyGeometry<D>) -> f64 {
 }
 
 /// Functions that share an element with each function, up to and including itself.
-struct Blocks {
+struct FunctionBlocks {
     starts: Vec<usize>,
     others: Vec<u32>,
 }
 
-fn pattern<const D: usize>(space: &Space<D>) -> (Pattern, Blocks) {
+fn pattern<const D: usize>(space: &CoarseSpace<D>) -> (Pattern, FunctionBlocks) {
     let mut pairs: Vec<u64> = Vec::with_capacity(space.elements.len() * (1 << (2 * D)));
     for element in &space.elements {
         for &column in &element.functions[..1 << D] {
@@ -215,7 +215,7 @@ fn pattern<const D: usize>(space: &Space<D>) -> (Pattern, Blocks) {
     }
     pairs.sort_unstable();
     pairs.dedup();
-    let mut blocks = Blocks { starts: vec![0], others: Vec::with_capacity(pairs.len()) };
+    let mut blocks = FunctionBlocks { starts: vec![0], others: Vec::with_capacity(pairs.len()) };
     let mut pattern = Pattern { starts: vec![0], rows: Vec::with_capacity(pairs.len() * D * D) };
     let mut next = 0;
     for column in 0..space.functions {
@@ -238,9 +238,9 @@ fn pattern<const D: usize>(space: &Space<D>) -> (Pattern, Blocks) {
 
 /// Sums the element matrices and the shift.
 fn assemble<const D: usize>(
-    space: &Space<D>,
+    space: &CoarseSpace<D>,
     pattern: &Pattern,
-    blocks: &Blocks,
+    blocks: &FunctionBlocks,
     matrices: &[(ElementMatrix, [f64; CORNERS])],
     shift: f64,
 ) -> Vec<f64> {

@@ -20,22 +20,22 @@ pub const NONE: u32 = u32::MAX;
 
 /// Particles of one cell that share all functions.
 #[derive(Clone, Debug)]
-pub struct Element {
+pub struct CoarseElement {
     /// Function of each corner of the cell.
     pub functions: [u32; CORNERS],
-    /// Start and end of its particles in [`Space::members`].
+    /// Start and end of its particles in [`CoarseSpace::members`].
     pub members: [usize; 2],
 }
 
 /// The functions, and the particles they move: by their sites, and by their numbers after
-/// [`Space::renumber`].
-pub struct Space<const D: usize> {
+/// [`CoarseSpace::renumber`].
+pub struct CoarseSpace<const D: usize> {
     /// Edges of a cell, m.
     pub edge: [f64; D],
     /// Number of functions, in an order of elimination with little fill (nested dissection of the grid).
     pub functions: usize,
     /// The elements.
-    pub elements: Vec<Element>,
+    pub elements: Vec<CoarseElement>,
     /// Sites, element by element.
     pub members: Vec<u32>,
     /// Element of each site; particles without bonds have none.
@@ -45,13 +45,13 @@ pub struct Space<const D: usize> {
 }
 
 /// The cells over a body's bounding box.
-struct Grid<const D: usize> {
+struct BackgroundGrid<const D: usize> {
     low: [f64; D],
     edge: [f64; D],
     cells: [usize; D],
 }
 
-impl<const D: usize> Grid<D> {
+impl<const D: usize> BackgroundGrid<D> {
     /// Divides the bounding box into a whole number of cells of about `edge`.
     fn new(bonds: &dyn BodyGeometry<D>, edge: f64) -> Self {
         let [low, high] = bounds(bonds.particles().iter().map(|&site| bonds.position(site as usize)));
@@ -113,7 +113,7 @@ impl<const D: usize> Grid<D> {
 }
 
 /// The bonded particles of each cell.
-struct Filled<const D: usize> {
+struct OccupiedCells<const D: usize> {
     /// Sites, ascending in each cell.
     members: Groups<u32>,
     /// True if every particle of a cell has all its bonds.
@@ -122,8 +122,8 @@ struct Filled<const D: usize> {
     local: Field<D>,
 }
 
-impl<const D: usize> Filled<D> {
-    fn new(grid: &Grid<D>, bonds: &dyn BodyGeometry<D>, bonded: &[u32], whole: u32) -> Self {
+impl<const D: usize> OccupiedCells<D> {
+    fn new(grid: &BackgroundGrid<D>, bonds: &dyn BodyGeometry<D>, bonded: &[u32], whole: u32) -> Self {
         let mut local = Field::zeros(bonds.sites());
         let cells: usize = grid.cells.iter().product();
         let mut members = Vec::with_capacity(bonds.particles().len());
@@ -138,24 +138,24 @@ impl<const D: usize> Filled<D> {
     }
 
     /// Returns true if a particle lies beside a node.
-    fn is_beside(&self, grid: &Grid<D>, node: usize) -> bool {
+    fn is_beside(&self, grid: &BackgroundGrid<D>, node: usize) -> bool {
         grid.cells_around(node).any(|cell| !self.members.group(cell).is_empty())
     }
 
     /// Number of nodes beside a particle, a lower bound of the number of functions.
-    fn nodes(&self, grid: &Grid<D>) -> usize {
+    fn nodes(&self, grid: &BackgroundGrid<D>) -> usize {
         let nodes: usize = grid.node_counts().iter().product();
         (0..nodes).filter(|&node| self.is_beside(grid, node)).count()
     }
 }
 
 /// Parts of a hat's support: the part of each site in it, sites ascending.
-struct Split {
+struct SupportParts {
     parts: u32,
     part_of: Vec<(u32, u32)>,
 }
 
-impl<const D: usize> Space<D> {
+impl<const D: usize> CoarseSpace<D> {
     /// Builds functions on cells of about `edge`, or larger ones if there would be more than `most`
     /// functions; `None` if even that does not help. `bonded` has the number of bonds of each site, `whole`
     /// the number of bonds of a complete family.
@@ -168,15 +168,15 @@ impl<const D: usize> Space<D> {
     ) -> Option<Self> {
         let mut edge = edge;
         for _ in 0..24 {
-            let grid = Grid::new(bonds, edge);
+            let grid = BackgroundGrid::new(bonds, edge);
             let nodes: f64 = grid.node_counts().iter().map(|&n| n as f64).product();
             // bodies that fill little of their box may have more nodes than functions, but not without limit
             let mut excess = nodes / (64.0 * most as f64);
             if excess <= 1.0 {
-                let filled = Filled::new(&grid, bonds, bonded, whole);
+                let filled = OccupiedCells::new(&grid, bonds, bonded, whole);
                 let mut functions = filled.nodes(&grid);
                 if (1..=most).contains(&functions) {
-                    let space = Self::on(&grid, filled, bonds);
+                    let space = Self::on_grid(&grid, filled, bonds);
                     functions = space.functions;
                     if functions <= most {
                         return Some(space);
@@ -192,7 +192,7 @@ impl<const D: usize> Space<D> {
         None
     }
 
-    fn on(grid: &Grid<D>, filled: Filled<D>, bonds: &dyn BodyGeometry<D>) -> Self {
+    fn on_grid(grid: &BackgroundGrid<D>, filled: OccupiedCells<D>, bonds: &dyn BodyGeometry<D>) -> Self {
         let (sites, cells) = (bonds.sites(), filled.is_whole.len());
         // connected parts around each node
         let nodes: usize = grid.node_counts().iter().product();
@@ -200,7 +200,7 @@ impl<const D: usize> Space<D> {
             (0..nodes).filter(|&node| !grid.cells_around(node).all(|cell| filled.is_whole[cell])).collect();
         // few batches: each needs a table of all sites
         let batch = suspects.len().div_ceil(4 * rayon::current_num_threads()).max(1);
-        let found: Vec<Vec<(usize, Split)>> = suspects
+        let found: Vec<Vec<(usize, SupportParts)>> = suspects
             .par_chunks(batch)
             .map(|batch| {
                 let mut place = vec![NONE; sites];
@@ -213,7 +213,7 @@ impl<const D: usize> Space<D> {
                 batch.iter().filter_map(split).collect()
             })
             .collect();
-        let splits: BTreeMap<usize, Split> = found.into_iter().flatten().collect();
+        let splits: BTreeMap<usize, SupportParts> = found.into_iter().flatten().collect();
         let mut first = vec![0_u32; nodes];
         let mut functions = 0_u32;
         for node in elimination_order(grid.node_counts()) {
@@ -256,10 +256,10 @@ impl<const D: usize> Space<D> {
     /// Adds the elements of a cell: one, or one for each set of parts that its particles belong to.
     fn add_cell(
         &mut self,
-        grid: &Grid<D>,
+        grid: &BackgroundGrid<D>,
         cell: usize,
         sites: &[u32],
-        splits: &BTreeMap<usize, Split>,
+        splits: &BTreeMap<usize, SupportParts>,
         first: &[u32],
     ) {
         let mut groups: BTreeMap<[u32; CORNERS], Vec<u32>> = BTreeMap::new();
@@ -289,7 +289,7 @@ impl<const D: usize> Space<D> {
             let start = self.members.len();
             sites.iter().for_each(|&site| self.element_of[site as usize] = self.elements.len() as u32);
             self.members.extend(sites);
-            self.elements.push(Element { functions, members: [start, self.members.len()] });
+            self.elements.push(CoarseElement { functions, members: [start, self.members.len()] });
         }
     }
 }
@@ -300,7 +300,7 @@ fn split<const D: usize>(
     bonds: &dyn BodyGeometry<D>,
     mut window: Vec<u32>,
     place: &mut [u32],
-) -> Option<Split> {
+) -> Option<SupportParts> {
     window.sort_unstable();
     for (index, &site) in window.iter().enumerate() {
         place[site as usize] = index as u32;
@@ -335,7 +335,7 @@ fn split<const D: usize>(
         }
         part_of.push((window[index], number[root]));
     }
-    Some(Split { parts: count, part_of })
+    Some(SupportParts { parts: count, part_of })
 }
 
 /// Orders the nodes of a grid by nested dissection: both halves first, the plane between them last.

@@ -2,7 +2,7 @@
 //! V_I ∇φ_a : C_I : ∇φ_b, C_I = Σ_J kθ w V_J/|ξ| T ⊗ ξ ⊗ ξ, with T = t′ m⊗m + (t/λ)(1 − m⊗m) the tangent of a
 //! bond of direction m: the Hessian of the bonds' energy for functions linear within a horizon.
 
-use super::space::{CORNERS, Element, Space};
+use super::space::{CORNERS, CoarseElement, CoarseSpace};
 use crate::bonds::{BodyGeometry, Bonds};
 use crate::field::Field;
 use crate::potential::BondPotential;
@@ -29,13 +29,13 @@ const SMALL: f64 = 0.1;
 type Tangent = [[f64; SYMMETRIC]; SYMMETRIC];
 
 /// Σ V ∂φ_a ∂φ_b for each pair of corners a ≤ b, mixed pairs of derivatives both ways.
-type Products = [[f64; SYMMETRIC]; PAIRS];
+type GradientProducts = [[f64; SYMMETRIC]; PAIRS];
 
 /// Element stiffness: for each pair of corners a ≤ b, the matrix of components (i of a, j of b) at iD + j.
 pub type ElementMatrix = [[f64; 9]; PAIRS];
 
 /// Counts of all bonds before anything is built.
-pub struct Survey {
+pub struct BondCounts {
     /// Number of bonds of each site.
     pub bonded: Vec<u32>,
     /// The most bonds of any particle.
@@ -44,7 +44,7 @@ pub struct Survey {
     pub moved: f64,
 }
 
-impl Survey {
+impl BondCounts {
     /// Counts the bonds of every particle, and measures those of a lattice to the nearest particles.
     pub fn new<const D: usize>(bonds: &dyn Bonds<D>, displacement: &Field<D>) -> Self {
         let lattice = bonds.as_lattice();
@@ -94,7 +94,7 @@ impl Tangents {
         Self { low, step, nodes: (0..NODES).map(node).collect() }
     }
 
-    fn at(&self, e: f64) -> [f64; 2] {
+    fn value_at(&self, e: f64) -> [f64; 2] {
         self.nodes[(((e - self.low) / self.step).max(0.0).round() as usize).min(NODES - 1)]
     }
 }
@@ -104,7 +104,7 @@ pub struct Assembly<'a, const D: usize> {
     bonds: &'a dyn BodyGeometry<D>,
     loads: &'a Loads<D>,
     displacement: &'a Field<D>,
-    survey: &'a Survey,
+    survey: &'a BondCounts,
     tangents: Tangents,
     modulus: f64,
     /// Stiffness density M_I at constrained components, N/m⁵.
@@ -115,7 +115,7 @@ pub struct Assembly<'a, const D: usize> {
     interior: Option<Tangent>,
     /// Volume of a cell (2D: times the thickness), m³, and Σ V ∂φ_a ∂φ_b over all of it.
     cell: f64,
-    full: Products,
+    full: GradientProducts,
     /// λ of the volume in excess of that of bonds, Pa.
     volumetric: f64,
 }
@@ -126,7 +126,7 @@ impl<'a, const D: usize> Assembly<'a, D> {
         bonds: &'a dyn BodyGeometry<D>,
         loads: &'a Loads<D>,
         displacement: &'a Field<D>,
-        survey: &'a Survey,
+        survey: &'a BondCounts,
         law: (&dyn BondPotential, [f64; 2], [f64; 2]),
         springs: &'a [f64],
         edge: [f64; D],
@@ -137,7 +137,7 @@ impl<'a, const D: usize> Assembly<'a, D> {
         let thickness = volumes / bonds.particles().len().max(1) as f64 / bonds.spacing().powi(D as i32);
         let cell = thickness * edge.iter().product::<f64>();
         // Gauss' two points along each axis are exact
-        let mut full: Products = [[0.0; SYMMETRIC]; PAIRS];
+        let mut full: GradientProducts = [[0.0; SYMMETRIC]; PAIRS];
         for point in 0..1 << D {
             let local = std::array::from_fn(|d| 0.5 + [-0.5, 0.5][point >> d & 1] / 3.0_f64.sqrt());
             let (_, slopes) = hats::<D>(local, edge);
@@ -180,7 +180,7 @@ impl<'a, const D: usize> Assembly<'a, D> {
                 square += zeta[d] * zeta[d];
                 e += eta * (2.0 * bond.bond[d] + eta);
             }
-            let [along, across] = self.tangents.at(e / (bond.length * bond.length));
+            let [along, across] = self.tangents.value_at(e / (bond.length * bond.length));
             let factor = self.modulus * bond.weight / bond.length;
             let difference = (along - across) / square.max(f64::MIN_POSITIVE);
             let mut pair = 0;
@@ -225,7 +225,11 @@ impl<'a, const D: usize> Assembly<'a, D> {
     }
 
     /// Computes the stiffness of an element, and for each corner Σ V φ over its particles.
-    pub fn element(&self, space: &Space<D>, element: &Element) -> (ElementMatrix, [f64; CORNERS]) {
+    pub fn element(
+        &self,
+        space: &CoarseSpace<D>,
+        element: &CoarseElement,
+    ) -> (ElementMatrix, [f64; CORNERS]) {
         let corners = 1 << D;
         let mut matrix = [[0.0; 9]; PAIRS];
         let mut measure = [0.0; CORNERS];
@@ -256,7 +260,7 @@ impl<'a, const D: usize> Assembly<'a, D> {
                 contract::<D>(&mut matrix, &tangent, &own);
                 add_tangent(&mut sum, &tangent, volume);
             }
-            self.hold(&mut matrix, site, volume, &values);
+            self.add_springs(&mut matrix, site, volume, &values);
         }
         if let Some(shared) = &shared {
             contract::<D>(&mut matrix, shared, &products);
@@ -271,7 +275,7 @@ impl<'a, const D: usize> Assembly<'a, D> {
     }
 
     /// Adds the springs that hold constrained components.
-    fn hold(&self, matrix: &mut ElementMatrix, site: usize, volume: f64, values: &[f64; CORNERS]) {
+    fn add_springs(&self, matrix: &mut ElementMatrix, site: usize, volume: f64, values: &[f64; CORNERS]) {
         let constrained = self.loads.constrained(site);
         if constrained == 0 {
             return;
@@ -300,7 +304,7 @@ impl<'a, const D: usize> Assembly<'a, D> {
 }
 
 /// matrix += C : products, corner pair by corner pair.
-fn contract<const D: usize>(matrix: &mut ElementMatrix, tangent: &Tangent, products: &Products) {
+fn contract<const D: usize>(matrix: &mut ElementMatrix, tangent: &Tangent, products: &GradientProducts) {
     let pairs = D * (D + 1) / 2;
     let corners = 1 << D;
     for (result, products) in matrix.iter_mut().zip(products).take(corners * (corners + 1) / 2) {
@@ -345,7 +349,7 @@ fn add_tangent(sum: &mut Tangent, tangent: &Tangent, volume: f64) {
 }
 
 /// products += V ∂φ_a ∂φ_b for each pair of corners a ≤ b; mixed pairs of derivatives both ways.
-fn add_products<const D: usize>(products: &mut Products, volume: f64, slopes: &[[f64; D]; CORNERS]) {
+fn add_products<const D: usize>(products: &mut GradientProducts, volume: f64, slopes: &[[f64; D]; CORNERS]) {
     let mut at = 0;
     for a in 0..1 << D {
         for b in a..1 << D {

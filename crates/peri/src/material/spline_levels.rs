@@ -10,21 +10,21 @@ use rayon::prelude::*;
 const FINEST: f64 = 1.0;
 
 /// Grids over a cloud, from the finest on.
-pub(super) struct Levels<const D: usize> {
+pub(super) struct SplineLevels<const D: usize> {
     low: [f64; D],
     width: f64,
-    grids: Vec<Grid<D>>,
+    grids: Vec<SplineGrid<D>>,
 }
 
 /// Products of quadratic splines, one around the middle of each cell, the first axis fastest.
-struct Grid<const D: usize> {
+struct SplineGrid<const D: usize> {
     cells: [usize; D],
     /// 1/∫(Δb)² of a spline whose particles are all inside; 0 for others.
     weights: Vec<f64>,
     values: Vec<Vector<D>>,
 }
 
-impl<const D: usize> Levels<D> {
+impl<const D: usize> SplineLevels<D> {
     /// Builds the grids for fields that are zero outside of `inside`, and an operator `stiffness`·∫(Δθ)² on
     /// smooth fields.
     pub(super) fn new(cloud: &CloudBonds<D>, inside: &[bool], stiffness: f64) -> Self {
@@ -33,9 +33,9 @@ impl<const D: usize> Levels<D> {
         // a cell and more around the body, for the splines at its ends
         let cells: [usize; D] = std::array::from_fn(|d| ((high[d] - low[d]) / width) as usize + 4);
         let mut levels = Self { low: low.map(|x| x - 1.5 * width), width, grids: Vec::new() };
-        let mut grid = Grid::new(cells);
+        let mut grid = SplineGrid::new(cells);
         for site in (0..cloud.sites()).filter(|&site| !inside[site]) {
-            levels.at(cells, cloud.position(site), |node, _| grid.weights[node] = 0.0);
+            levels.visit_splines(cells, cloud.position(site), |node, _| grid.weights[node] = 0.0);
         }
         loop {
             let coarse = grid.coarser();
@@ -57,7 +57,7 @@ impl<const D: usize> Levels<D> {
         let (cells, mut values) = (finest.cells, std::mem::take(&mut finest.values));
         values.fill(Vector::zeros());
         for (site, residual) in residual.iter().enumerate() {
-            self.at(cells, cloud.position(site), |node, weight| values[node] += residual * weight);
+            self.visit_splines(cells, cloud.position(site), |node, weight| values[node] += residual * weight);
         }
         self.grids[0].values = values;
         for k in 1..self.grids.len() {
@@ -79,13 +79,15 @@ impl<const D: usize> Levels<D> {
         }
         let (this, finest) = (&*self, &self.grids[0]);
         to.par_iter_mut().enumerate().for_each(|(site, to)| {
-            this.at(cells, cloud.position(site), |node, weight| *to += finest.values[node] * weight);
+            this.visit_splines(cells, cloud.position(site), |node, weight| {
+                *to += finest.values[node] * weight
+            });
         });
     }
 
     /// Visits the splines of the finest grid at a position.
     #[inline]
-    fn at(&self, cells: [usize; D], place: [f64; D], mut visit: impl FnMut(usize, f64)) {
+    fn visit_splines(&self, cells: [usize; D], place: [f64; D], mut visit: impl FnMut(usize, f64)) {
         let (mut first, mut stride, mut strides) = (0, 1, [0; D]);
         let mut weights = [[0.0; 3]; D];
         for d in 0..D {
@@ -108,7 +110,7 @@ impl<const D: usize> Levels<D> {
     }
 }
 
-impl<const D: usize> Grid<D> {
+impl<const D: usize> SplineGrid<D> {
     fn new(cells: [usize; D]) -> Self {
         let count = cells.iter().product();
         Self { cells, weights: vec![1.0; count], values: vec![Vector::zeros(); count] }

@@ -7,9 +7,9 @@ use crate::field::Field;
 /// Number of cuts of one step, or reductions of its load, estimated from stretches; then it is halved.
 pub(super) const BY_STRETCH: u32 = 3;
 /// Motion of a plane beyond first contact in one step, in spacings.
-const BEYOND: f64 = 0.5;
+const TOUCH_MOTION: f64 = 0.5;
 /// Fraction of the shortest step below which a remainder is no step of its own.
-const CRUMB: f64 = 0.25;
+const LEAST_REMAINDER: f64 = 0.25;
 
 impl<const D: usize> System<'_, D> {
     /// Shortest load step: the least difference of two prescribed factors over [`Self::refine`].
@@ -26,7 +26,8 @@ impl<const D: usize> System<'_, D> {
         let at = state.step;
         let before = at.checked_sub(1).map_or(0.0, |before| self.factors[before]);
         let length = self.factors[at] - before;
-        let may = self.refine > 1 && state.control.round == 0 && length.abs() > (1.0 + CRUMB) * shortest;
+        let may =
+            self.refine > 1 && state.control.round == 0 && length.abs() > (1.0 + LEAST_REMAINDER) * shortest;
         let stretched = self.is_overstretched(state.stretches.balanced);
         if !(may && stretched && !self.beyond(state).is_empty()) {
             return false;
@@ -50,7 +51,7 @@ impl<const D: usize> System<'_, D> {
     pub(super) fn cut_at_touch(&mut self, state: &mut State<D>) -> bool {
         let Some(contact) = self.repulsion().filter(|_| !self.snap_back) else { return false };
         let [before, after] = contact.approach(&state.displacement);
-        let most = before.max(0.0) + BEYOND * self.bonds.spacing();
+        let most = before.max(0.0) + TOUCH_MOTION * self.bonds.spacing();
         if after.is_nan() || after <= most * (1.0 + 1e-6) {
             return false;
         }
@@ -75,7 +76,7 @@ impl<const D: usize> System<'_, D> {
         } else {
             [0.5, 0.5]
         };
-        let apart = |end: &f64| *end > CRUMB * shortest && *end < 1.0 - CRUMB * shortest;
+        let apart = |end: &f64| *end > LEAST_REMAINDER * shortest && *end < 1.0 - LEAST_REMAINDER * shortest;
         let mut new: Vec<f64> = ends.into_iter().filter(apart).map(|end| before[0] + end * length).collect();
         new.dedup();
         new

@@ -12,7 +12,7 @@ const LEAST_STRAIN: f64 = 0.01;
 
 /// Reference scale of a body's forces besides its reactions, in the reference state.
 #[derive(Clone, Debug, Default)]
-pub struct Scale {
+pub struct ForceScale {
     /// s of each site, N/m⁴.
     springs: Vec<f64>,
     /// U at load factor 1, m, and L, m.
@@ -23,7 +23,7 @@ pub struct Scale {
     pub(super) held_sum: f64,
 }
 
-impl Scale {
+impl ForceScale {
     /// Measures a body with its loads; `stiffness` is kθK.
     pub fn new<const D: usize>(bonds: &dyn BodyGeometry<D>, loads: &Loads<D>, stiffness: f64) -> Self {
         let of = |&site: &u32| {

@@ -4,7 +4,7 @@
 //! doi:10.1016/j.tafmec.2010.08.001, with the quotient of increments (the displacement-weighted form has
 //! negative stiffness in many iterations).
 
-use super::balance::Goal;
+use super::balance::SearchLimits;
 use super::load_stepping::{Equilibrium, QuasiStatic};
 use super::mass::{has_own_mass, own_mass, update_unit_mass};
 use super::method::Watch;
@@ -16,7 +16,7 @@ use crate::bonds::StretchRange;
 use crate::error::Error;
 
 /// Iterations between checks of the stretches.
-const LOOK: u64 = 10;
+const CHECK_INTERVAL: u64 = 10;
 
 /// Quasi-static solution by adaptive dynamic relaxation: robust, one force evaluation an iteration, but many
 /// more iterations than [`Lbfgs`](super::Lbfgs). Use it for comparison with published results, and for bodies
@@ -41,8 +41,8 @@ impl Default for DynamicRelaxation {
 }
 
 impl DynamicRelaxation {
-    fn goal(&self) -> Goal {
-        Goal { tolerance: self.tolerance, max_iterations: self.max_iterations, accept: self.accept }
+    fn goal(&self) -> SearchLimits {
+        SearchLimits { tolerance: self.tolerance, max_iterations: self.max_iterations, accept: self.accept }
     }
 }
 
@@ -94,8 +94,8 @@ impl RelaxationSolver {
         let settings = self.settings;
         // a step's first iterations move farthest: the fit must not be extrapolated for long
         let look = system.breaks_on_the_way()
-            || state.counts.iteration < LOOK
-            || state.counts.iteration.is_multiple_of(LOOK);
+            || state.counts.iteration < CHECK_INTERVAL
+            || state.counts.iteration.is_multiple_of(CHECK_INTERVAL);
         let factor = system.factors[state.step];
         system.prepare(&state.displacement);
         let own = has_own_mass(system, state);
@@ -113,7 +113,7 @@ impl RelaxationSolver {
         if !sums.is_finite() {
             return Err(system.not_finite(state));
         }
-        state.stretches.see(observed);
+        state.stretches.observe(observed);
         let mut broken = false;
         if look {
             // after a refit this force still belongs to the old fit, whose range it left by little: continue
@@ -121,8 +121,8 @@ impl RelaxationSolver {
             if system.breaks_on_the_way() && system.is_overstretched(observed) {
                 let sites = system.break_bonds(state);
                 broken = !sites.is_empty();
-                Equilibrium::broke(self, system, &sites);
-                system.refuse_adrift(state, settings.tolerance)?;
+                Equilibrium::bonds_broke(self, system, &sites);
+                system.refuse_unsupported(state, settings.tolerance)?;
             }
         }
         let quotient = if state.counts.iteration > 0 && sums.quotient_bottom > 0.0 {
@@ -135,13 +135,13 @@ impl RelaxationSolver {
         let late = state.counts.iteration.saturating_sub(LONG) as f64 / LONG as f64;
         let damping = (2.0 * quotient.max(0.0).sqrt()).clamp(LATE_DAMPING * late.min(1.0), 1.9);
         let goal = settings.goal();
-        state.note(system, &sums, &goal);
+        state.record_sums(system, &sums, &goal);
         if state.is_balanced(&goal, broken)? {
             return Ok(true);
         }
         move_pass(&system.loads, state, self.masses(system, own), mass, damping);
         if let Some(contact) = system.repulsion() {
-            contact.still(&mut state.velocity);
+            contact.stop_detached(&mut state.velocity);
         }
         state.counts.iterate();
         // masses are rebuilt from the state alone
@@ -169,7 +169,7 @@ impl<const D: usize> Equilibrium<D> for RelaxationSolver {
         Ok(None)
     }
 
-    fn broke(&mut self, system: &System<D>, sites: &[u32]) {
+    fn bonds_broke(&mut self, system: &System<D>, sites: &[u32]) {
         update_unit_mass(&*system.bonds, sites, &mut self.unit_mass);
     }
 

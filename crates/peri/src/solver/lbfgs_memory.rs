@@ -6,8 +6,8 @@
 //! pairs are most of the memory traffic of an iteration, and a direction needs no more. All sums are in
 //! double precision.
 
+use super::particle_map::in_order;
 use super::passes::{LANES, sum};
-use super::places::in_order;
 use crate::field::{CHUNK, Field, chunk_range};
 use pulp::{Arch, NullaryFnOnce, Simd, WithSimd};
 use std::collections::VecDeque;
@@ -19,7 +19,7 @@ const BLOCK: usize = 512;
 type Single<const D: usize> = [Vec<f32>; D];
 
 /// A step and the change of the gradient.
-struct Pair<const D: usize> {
+struct StepPair<const D: usize> {
     /// s.
     step: Single<D>,
     /// w = B y.
@@ -34,16 +34,16 @@ struct Pair<const D: usize> {
 }
 
 /// The pairs, oldest first.
-pub struct Memory<const D: usize> {
+pub struct LbfgsMemory<const D: usize> {
     most: usize,
-    pairs: VecDeque<Pair<D>>,
+    pairs: VecDeque<StepPair<D>>,
     /// Fields to be reused.
     spare: Vec<Single<D>>,
     /// Scale of the initial inverse; 1 until a pair is known.
     scale: f64,
 }
 
-impl<const D: usize> Memory<D> {
+impl<const D: usize> LbfgsMemory<D> {
     /// Creates a memory for `most` pairs.
     pub fn new(most: usize) -> Self {
         Self { most, pairs: VecDeque::new(), spare: Vec::new(), scale: 1.0 }
@@ -110,7 +110,7 @@ impl<const D: usize> Memory<D> {
                         let (s, w) = (&pair.step[c][place.clone()], &pair.image[c][place.clone()]);
                         arch.dispatch(Combine { out: &mut *out, scaled: scale * a, w, weight: *weight, s });
                     }
-                    sum += arch.dispatch(Product { a: out, b: g });
+                    sum += arch.dispatch(DotProduct { a: out, b: g });
                 }
             }
             sum
@@ -157,9 +157,9 @@ impl<const D: usize> Memory<D> {
                     let y = &*change;
                     let mut add = |s: &[f32], w: &[f32], sums: &mut [f64]| {
                         let [wide_s, wide_w] = wide.each_mut().map(|wide| &mut wide[..y.len()]);
-                        arch.dispatch(Widen { from: s, to: &mut *wide_s });
-                        arch.dispatch(Widen { from: w, to: &mut *wide_w });
-                        let products = arch.dispatch(Products { s: wide_s, w: wide_w, y, g });
+                        arch.dispatch(ToDouble { from: s, to: &mut *wide_s });
+                        arch.dispatch(ToDouble { from: w, to: &mut *wide_w });
+                        let products = arch.dispatch(PairProducts { s: wide_s, w: wide_w, y, g });
                         for k in 0..4 {
                             sums[k] += products[k];
                         }
@@ -195,7 +195,7 @@ impl<const D: usize> Memory<D> {
             self.spare.extend([oldest.step, oldest.image]);
         }
         let (later, gradient) = (VecDeque::new(), [sums[2], sums[3]]);
-        self.pairs.push_back(Pair { step: new_step, image: new_image, curvature, size, later, gradient });
+        self.pairs.push_back(StepPair { step: new_step, image: new_image, curvature, size, later, gradient });
     }
 }
 
@@ -207,12 +207,12 @@ fn chunks<const D: usize>(field: &mut Single<D>) -> Vec<[&mut [f32]; D]> {
 }
 
 /// Converts to double precision; sums that convert as they go are not vectorised.
-struct Widen<'a> {
+struct ToDouble<'a> {
     from: &'a [f32],
     to: &'a mut [f64],
 }
 
-impl NullaryFnOnce for Widen<'_> {
+impl NullaryFnOnce for ToDouble<'_> {
     type Output = ();
     #[inline(always)]
     fn call(self) {
@@ -224,14 +224,14 @@ impl NullaryFnOnce for Widen<'_> {
 }
 
 /// s·y, w·y, s·g, w·g.
-struct Products<'a> {
+struct PairProducts<'a> {
     s: &'a [f64],
     w: &'a [f64],
     y: &'a [f64],
     g: &'a [f64],
 }
 
-impl WithSimd for Products<'_> {
+impl WithSimd for PairProducts<'_> {
     type Output = [f64; 4];
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> [f64; 4] {
@@ -284,12 +284,12 @@ impl NullaryFnOnce for Combine<'_> {
 }
 
 /// a·b.
-struct Product<'a> {
+struct DotProduct<'a> {
     a: &'a [f64],
     b: &'a [f64],
 }
 
-impl NullaryFnOnce for Product<'_> {
+impl NullaryFnOnce for DotProduct<'_> {
     type Output = f64;
     #[inline(always)]
     fn call(self) -> f64 {

@@ -1,6 +1,6 @@
 //! Forces of the bonds of one offset.
 
-use super::Loaded;
+use super::StressInput;
 use super::convolution::lanes;
 use crate::bonds::{BodyGeometry, LatticeBonds, TILE, Weights};
 use crate::potential::KernelFit;
@@ -13,7 +13,7 @@ const VECTORS: usize = 2;
 /// intact. `out` has [`lanes`] numbers per site.
 pub fn forces<const D: usize>(
     bonds: &LatticeBonds<D>,
-    state: &Loaded<D>,
+    state: &StressInput<D>,
     k: usize,
     start: usize,
     filled: &[bool],
@@ -34,7 +34,7 @@ pub fn forces<const D: usize>(
         inverse_length: 1.0 / square.sqrt(),
         scale: 2.0 * state.modulus * volume * volume / square.sqrt(),
     };
-    Arch::new().dispatch(Chunk { pull, start, filled, out });
+    Arch::new().dispatch(ForceChunk { pull, start, filled, out });
 }
 
 /// scale·weight·q(e) ζ, from the displacements of both ends.
@@ -51,14 +51,14 @@ struct Pull<'a, const D: usize> {
 }
 
 /// Runs [`forces`] over a chunk.
-struct Chunk<'a, const D: usize> {
+struct ForceChunk<'a, const D: usize> {
     pull: Pull<'a, D>,
     start: usize,
     filled: &'a [bool],
     out: &'a mut [f64],
 }
 
-impl<const D: usize> WithSimd for Chunk<'_, D> {
+impl<const D: usize> WithSimd for ForceChunk<'_, D> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
@@ -74,7 +74,7 @@ impl<const D: usize> WithSimd for Chunk<'_, D> {
             // rows are padded: a bond that leaves the storage is never intact
             if there < self.pull.sites && there + TILE <= self.pull.sites {
                 for part in (0..TILE).step_by(VECTORS * S::F64_LANES) {
-                    self.pull.some::<S>(simd, start, there, part, &mut forces);
+                    self.pull.tile_forces::<S>(simd, start, there, part, &mut forces);
                 }
             }
             for i in 0..TILE {
@@ -102,7 +102,14 @@ fn vectors<S: Simd>(simd: S, numbers: &[f64], from: usize) -> [S::f64s; VECTORS]
 impl<const D: usize> Pull<'_, D> {
     /// Computes some vectors of a tile, from its site `part` on.
     #[inline(always)]
-    fn some<S: Simd>(&self, simd: S, start: usize, there: usize, part: usize, forces: &mut [[f64; TILE]; D]) {
+    fn tile_forces<S: Simd>(
+        &self,
+        simd: S,
+        start: usize,
+        there: usize,
+        part: usize,
+        forces: &mut [[f64; TILE]; D],
+    ) {
         let zero = simd.splat_f64s(0.0);
         let (mut e, mut zeta) = ([zero; VECTORS], [[zero; VECTORS]; D]);
         for d in 0..D {

@@ -18,7 +18,7 @@ impl<const D: usize> System<'_, D> {
         state.fracture.restore(&mut *self.bonds)?;
         if state.fracture.intact.is_some() {
             let particles = self.bonds.particles().to_vec();
-            self.release(particles.iter().copied());
+            self.unload_detached(particles.iter().copied());
         }
         if !state.control.factors.is_empty() {
             self.factors.to_mut().clone_from(&state.control.factors);
@@ -27,7 +27,7 @@ impl<const D: usize> System<'_, D> {
         state.stretches.fitted[1] = state.stretches.fitted[1].min(most(self.breaking.as_ref()));
         // a bound that depends on the displacement stays that of the previous run
         let known = Some(state.stretches.tangent).filter(|&tangent| tangent > 0.0);
-        self.fit(state, known)
+        self.fit_law(state, known)
     }
 
     /// Returns true if every stretch of the state, `observed` if known, lies within the fit; widens the fit
@@ -39,7 +39,7 @@ impl<const D: usize> System<'_, D> {
     ) -> Result<bool, Error> {
         let observed = observed.unwrap_or_else(|| stretch_range(&*self.bonds, &state.displacement));
         state.stretches.balanced = observed;
-        state.stretches.see(observed);
+        state.stretches.observe(observed);
         Ok(!self.widen(state)?)
     }
 
@@ -48,7 +48,7 @@ impl<const D: usize> System<'_, D> {
         if !state.stretches.widen([least, most].map(|of| of(self.breaking.as_ref()))) {
             return Ok(false);
         }
-        self.fit(state, None)?;
+        self.fit_law(state, None)?;
         Ok(true)
     }
 
@@ -64,7 +64,7 @@ impl<const D: usize> System<'_, D> {
         }
     }
 
-    pub(super) fn fit(&mut self, state: &mut State<D>, known: Option<f64>) -> Result<(), Error> {
+    pub(super) fn fit_law(&mut self, state: &mut State<D>, known: Option<f64>) -> Result<(), Error> {
         let (bound, clamped) = (self.fit_bound, self.breaking.is_some());
         let cover = LawCover { stretches: state.stretches.fitted, bound, clamped, known };
         state.stretches.tangent = self.material.cover(&mut *self.bonds, &state.displacement, &cover)?;

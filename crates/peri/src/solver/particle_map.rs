@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Particles in consecutive sites of one work item.
-struct Run {
+struct SiteRun {
     /// First site, in its work item.
     site: usize,
     /// First particle, in its work item.
@@ -21,8 +21,8 @@ struct Run {
 
 /// Positions of particles in storage.
 #[derive(Default)]
-pub struct Places {
-    runs: Vec<Run>,
+pub struct ParticleMap {
+    runs: Vec<SiteRun>,
     /// The runs of each work item, its first particle, and the number of particles at the end.
     items: Vec<Range<usize>>,
     first: Vec<usize>,
@@ -30,7 +30,7 @@ pub struct Places {
     held: Vec<(usize, u8)>,
 }
 
-impl Places {
+impl ParticleMap {
     /// Maps the particles of a body and its loads.
     pub fn new<const D: usize>(bonds: &dyn BodyGeometry<D>, loads: &Loads<D>) -> Self {
         let mut places = Self { first: vec![0], ..Self::default() };
@@ -42,7 +42,7 @@ impl Places {
                 let (site, particle) = (particles[next] as usize % CHUNK, next - first);
                 match places.runs[begin..].last_mut() {
                     Some(run) if run.site + run.length == site => run.length += 1,
-                    _ => places.runs.push(Run { site, particle, length: 1 }),
+                    _ => places.runs.push(SiteRun { site, particle, length: 1 }),
                 }
                 next += 1;
             }
@@ -55,7 +55,7 @@ impl Places {
     }
 
     /// Constrained particles of a range, with the bits of their components.
-    pub fn held(&self, particles: Range<usize>) -> &[(usize, u8)] {
+    pub fn constrained(&self, particles: Range<usize>) -> &[(usize, u8)] {
         let place = |particle: usize| self.held.partition_point(|held| held.0 < particle);
         &self.held[place(particles.start)..place(particles.end)]
     }

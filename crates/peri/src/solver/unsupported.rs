@@ -7,8 +7,8 @@
 //! potential, so that no other mechanism lacks an equilibrium: only translations are checked. Contact pushes:
 //! a plane may hold a part that presses on it, a part held along d may hold one behind it.
 
+use super::force_scale::ForceScale;
 use super::load::Loads;
-use super::scale::Scale;
 use super::state::State;
 use super::system::System;
 use crate::bonds::{BodyGeometry, components};
@@ -19,15 +19,15 @@ use std::fmt;
 
 /// Displacement over the size of the body, or over the largest prescribed one, beyond which it is not an
 /// equilibrium.
-const FAR: f64 = 1e3;
+const FARTHEST: f64 = 1e3;
 
 /// A part of a body, connected by intact bonds, whose forces along an axis nothing balances.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Adrift {
+pub struct Unsupported {
     /// Number of particles.
     pub particles: usize,
     /// Number of particles of the body.
-    pub of: usize,
+    pub total: usize,
     /// Middle of the part in the reference configuration, m.
     pub middle: Vec<f64>,
     /// Axis of the force.
@@ -36,7 +36,7 @@ pub struct Adrift {
     pub force: f64,
 }
 
-impl fmt::Display for Adrift {
+impl fmt::Display for Unsupported {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let middle: Vec<String> = self.middle.iter().map(|x| format!("{:.4}", x * 1e3)).collect();
         write!(
@@ -44,7 +44,7 @@ impl fmt::Display for Adrift {
             "a part of {} of {} particles around X = ({}) mm bears {:.3e} N along {} at load factor 1, \
             and nothing holds it along {}",
             self.particles,
-            self.of,
+            self.total,
             middle.join(", "),
             self.force,
             self.axis,
@@ -55,7 +55,7 @@ impl fmt::Display for Adrift {
 
 /// Contacts that may hold a part besides supports, by pushing.
 #[derive(Clone, Debug, Default)]
-pub struct Stops<const D: usize> {
+pub struct ContactStops<const D: usize> {
     /// Normals of rigid planes, towards the body.
     pub normals: Vec<[f64; D]>,
     /// True if particles repel each other.
@@ -66,7 +66,7 @@ pub struct Stops<const D: usize> {
 
 /// Forces and extent of a part.
 #[derive(Clone, Copy)]
-struct Piece<const D: usize> {
+struct PartLoads<const D: usize> {
     particles: usize,
     /// Components prescribed in any particle.
     held: u8,
@@ -81,21 +81,21 @@ struct Piece<const D: usize> {
 
 /// Finds the first part of a body whose forces along an axis sum to more than `tolerance` of their sizes and
 /// which nothing can hold.
-pub fn adrift<const D: usize>(
+pub fn find_unsupported<const D: usize>(
     bonds: &dyn BodyGeometry<D>,
     loads: &Loads<D>,
     displacement: Option<&Field<D>>,
-    stops: &Stops<D>,
+    stops: &ContactStops<D>,
     tolerance: f64,
-) -> Option<Adrift> {
+) -> Option<Unsupported> {
     let body = loads.body_force.as_ref()?;
     let roots = components(bonds, |_, _| true);
-    let mut pieces: BTreeMap<u32, Piece<D>> = BTreeMap::new();
+    let mut pieces: BTreeMap<u32, PartLoads<D>> = BTreeMap::new();
     for &site in bonds.particles() {
         let (site, root) = (site as usize, roots[site as usize]);
         let (volume, force, rest) = (bonds.volume(site), body.get(site), bonds.position(site));
         let moved = displacement.map_or([0.0; D], |field| field.get(site));
-        let piece = pieces.entry(root).or_insert(Piece {
+        let piece = pieces.entry(root).or_insert(PartLoads {
             particles: 0,
             held: 0,
             force: [0.0; D],
@@ -115,10 +115,10 @@ pub fn adrift<const D: usize>(
             piece.extent[d] = [piece.extent[d][0].min(place), piece.extent[d][1].max(place)];
         }
     }
-    let holds = |piece: &Piece<D>, d: usize| {
+    let holds = |piece: &PartLoads<D>, d: usize| {
         let sign = piece.force[d].signum();
         let middle = piece.middle[d] / piece.particles as f64;
-        let ahead = |other: &Piece<D>| {
+        let ahead = |other: &PartLoads<D>| {
             let end = if sign > 0.0 { other.extent[d][1] } else { -other.extent[d][0] };
             other.held >> d & 1 == 1 && end > sign * middle
         };
@@ -130,9 +130,9 @@ pub fn adrift<const D: usize>(
     for piece in pieces.values() {
         for d in 0..D {
             if piece.force[d].abs() > tolerance * piece.size[d] && !holds(piece, d) {
-                return Some(Adrift {
+                return Some(Unsupported {
                     particles: piece.particles,
-                    of: bonds.particles().len(),
+                    total: bonds.particles().len(),
                     middle: piece.reference.map(|x| x / piece.particles as f64).to_vec(),
                     axis: ["x", "y", "z"][d],
                     force: piece.force[d],
@@ -144,17 +144,21 @@ pub fn adrift<const D: usize>(
 }
 
 impl<const D: usize> System<'_, D> {
-    fn stops(&self) -> Stops<D> {
-        let Some(contact) = self.repulsion() else { return Stops::default() };
+    fn stops(&self) -> ContactStops<D> {
+        let Some(contact) = self.repulsion() else { return ContactStops::default() };
         let normals = contact.planes().map(|plane| plane.normal).collect();
-        Stops { normals, pairs: contact.has_pairs(), rubs: contact.rubs() || contact.is_tied() }
+        ContactStops {
+            normals,
+            pairs: contact.has_pairs(),
+            rubs: contact.has_friction() || contact.is_tied(),
+        }
     }
 
     /// Refuses parts with a force and no support, in a body with dead loads only.
     ///
     /// # Errors
     /// [`Error::NoEquilibrium`] for such a part.
-    pub(super) fn refuse_adrift(&self, state: &State<D>, tolerance: f64) -> Result<(), Error> {
+    pub(super) fn refuse_unsupported(&self, state: &State<D>, tolerance: f64) -> Result<(), Error> {
         if self.loads.body_force.is_none() || self.factors.is_empty() {
             return Ok(());
         }
@@ -167,7 +171,8 @@ impl<const D: usize> System<'_, D> {
                 "every particle that bore a force has lost all its bonds".to_owned(),
             ));
         }
-        match adrift(&*self.bonds, &self.loads, Some(&state.displacement), &self.stops(), tolerance) {
+        match find_unsupported(&*self.bonds, &self.loads, Some(&state.displacement), &self.stops(), tolerance)
+        {
             Some(part) => Err(self.no_equilibrium(state, part.to_string())),
             None => Ok(()),
         }
@@ -182,8 +187,8 @@ impl<const D: usize> System<'_, D> {
             return Ok(());
         }
         let factor = self.factors.get(state.step).copied().unwrap_or(1.0);
-        let Scale { largest, diagonal, .. } = self.scale;
-        let limit = FAR * diagonal.max(largest * factor.abs());
+        let ForceScale { largest, diagonal, .. } = self.scale;
+        let limit = FARTHEST * diagonal.max(largest * factor.abs());
         let sites = self.bonds.particles().iter().map(|&site| state.displacement.get(site as usize));
         let square = sites.map(|u| u.iter().map(|x| x * x).sum::<f64>()).fold(0.0, f64::max);
         let far = square.sqrt();

@@ -1,16 +1,16 @@
 //! Length of explicit steps for solids, whose stiffness depends on the displacement: it grows with every
 //! stretch, under compression, and when bonds break.
 //!
-//! m, [`crate::material::Response::frequency_bound`], bounds ρω² of a state at the cost of at most a force.
-//! The Lanczos iteration gives ω² itself and with it the ratio r = ρω²/m; between two of them ω² is estimated
-//! as r m/ρ. Steps are those of [`MARGIN`] times that. m is checked at the end of a step, before its forces
-//! act: a step whose end would have required a shorter one, such as one that crushes a particle, is undone
-//! and cut, so that no kick follows from it. Checks follow every step in which bonds broke or strains may
-//! have changed by [`STRAIN`], and are otherwise the rarer the slower m grows; ω² is measured again if m or
-//! the stretches have changed much, since r changes with the stretches. All this follows from the state
-//! alone.
+//! m, [`crate::material::SolverMaterial::frequency_bound`], bounds ρω² of a state at the cost of at most a
+//! force. The Lanczos iteration gives ω² itself and with it the ratio r = ρω²/m; between two of them ω² is
+//! estimated as r m/ρ. Steps are those of [`MARGIN`] times that. m is checked at the end of a step, before
+//! its forces act: a step whose end would have required a shorter one, such as one that crushes a particle,
+//! is undone and cut, so that no kick follows from it. Checks follow every step in which bonds broke or
+//! strains may have changed by [`STRAIN`], and are otherwise the rarer the slower m grows; ω² is measured
+//! again if m or the stretches have changed much, since r changes with the stretches. All this follows from
+//! the state alone.
 
-use super::motion::Pace;
+use super::motion::StiffnessControl;
 use super::state::State;
 use super::system::System;
 use super::time_step::largest_frequency_squared;
@@ -27,15 +27,15 @@ const BELOW: f64 = 1.6;
 /// Least ratio of frequencies to the bound.
 const LEAST_PART: f64 = 0.05;
 /// Growth of strains, relative to themselves or to [`LEAST`], beyond which ω² is measured again.
-const GROWS: f64 = 0.25;
+const STRAIN_GROWTH: f64 = 0.25;
 const LEAST: f64 = 0.1;
 /// Largest strain that steps may add between two checks, by the increments of displacements.
 const STRAIN: f64 = 0.2;
 /// Most steps between two checks, and checks between two attempts at longer steps.
-const SELDOM: u32 = 8;
-const WAITS: u32 = 32;
+const MOST_INTERVAL: u32 = 8;
+const LENGTHENING_INTERVAL: u32 = 32;
 
-impl Pace {
+impl StiffnessControl {
     /// ω² by the bound and as assumed for the steps, 1/s².
     pub(super) fn squares(&self, density: f64) -> [f64; 2] {
         let covered = MARGIN * self.covered;
@@ -51,11 +51,11 @@ impl Pace {
 
     /// Records m: sets the time of the next check to half of the remaining margin at the previous rate of
     /// growth.
-    fn see(&mut self, bound: f64) {
+    fn record_bound(&mut self, bound: f64) {
         let (grown, steps) = (bound / self.last, f64::from(self.every));
         let left = (MARGIN * self.covered / (self.part * bound)).max(1.0).ln();
-        let slow = if grown > 1.0 { 0.5 * left * steps / grown.ln() } else { f64::from(SELDOM) };
-        self.every = (slow.min(2.0 * steps) as u32).clamp(1, SELDOM);
+        let slow = if grown > 1.0 { 0.5 * left * steps / grown.ln() } else { f64::from(MOST_INTERVAL) };
+        self.every = (slow.min(2.0 * steps) as u32).clamp(1, MOST_INTERVAL);
         (self.last, self.due, self.strain) = (bound, self.every, 0.0);
         self.looks += 1;
     }
@@ -81,10 +81,19 @@ impl VelocityVerlet {
         let good = measured > 0.0 && measured.is_finite() && bound > 0.0;
         let part = if good { (measured / bound).max(LEAST_PART) } else { 1.0 };
         let [low, high] = stretches(system, state);
-        let known = [low - GROWS * (1.0 - low).max(LEAST), high + GROWS * (high - 1.0).max(LEAST)];
+        let known =
+            [low - STRAIN_GROWTH * (1.0 - low).max(LEAST), high + STRAIN_GROWTH * (high - 1.0).max(LEAST)];
         let covered = part * bound;
-        state.motion.pace =
-            Pace { bound, part, covered, last: bound, every: 1, due: 1, known, ..Pace::default() };
+        state.motion.pace = StiffnessControl {
+            bound,
+            part,
+            covered,
+            last: bound,
+            every: 1,
+            due: 1,
+            known,
+            ..StiffnessControl::default()
+        };
     }
 
     /// Checks the prepared state at the end of a step, if that is due. Returns true if the step was too long;
@@ -104,7 +113,7 @@ impl VelocityVerlet {
         let bound = system.material.frequency_bound(&*system.bonds, &state.displacement, enough);
         let [low, high] = stretches(system, state);
         let pace = &mut state.motion.pace;
-        pace.see(bound);
+        pace.record_bound(bound);
         pace.outgrown |= low < pace.known[0] || high > pace.known[1];
         let needed = pace.part * bound;
         if needed <= MARGIN * pace.covered {
@@ -126,7 +135,7 @@ impl VelocityVerlet {
         broken: bool,
     ) {
         let pace = &mut state.motion.pace;
-        let waited = pace.looks >= WAITS;
+        let waited = pace.looks >= LENGTHENING_INTERVAL;
         let known = pace.last;
         let grown = pace.part * known > pace.covered;
         if !broken && !waited && !grown && !pace.outgrown {
@@ -138,7 +147,7 @@ impl VelocityVerlet {
             state.motion.limits.bounds += 1;
             system.prepare(&state.displacement);
             bound = system.material.frequency_bound(&*system.bonds, &state.displacement, enough);
-            state.motion.pace.see(bound);
+            state.motion.pace.record_bound(bound);
         }
         let pace = &mut state.motion.pace;
         pace.due = if broken { 1 } else { pace.due };

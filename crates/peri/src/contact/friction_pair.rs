@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 /// Two sides in contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub enum Pair {
+pub enum ContactPair {
     /// Two particles, by their sites.
     Particles(u32, u32),
     /// A plane and a face, by their numbers.
@@ -21,9 +21,9 @@ pub enum Pair {
 
 /// Friction of a pair.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Grip {
+pub struct FrictionPair {
     /// The sides.
-    pub pair: Pair,
+    pub pair: ContactPair,
     /// Elastic slip e, m.
     pub slip: [f64; 3],
     /// b = μN, N.
@@ -47,7 +47,7 @@ pub struct Drag {
     pub dissipated: f64,
 }
 
-impl Grip {
+impl FrictionPair {
     /// Energy of the elastic slip, J.
     pub fn energy(&self) -> f64 {
         0.5 * self.stiffness * length(self.slip).powi(2)
@@ -70,7 +70,7 @@ impl Grip {
     }
 
     /// Rotates the slip into the plane across a new normal, keeping its length, and shortens it to the bound.
-    pub fn fit(&mut self) {
+    pub fn project(&mut self) {
         let old = length(self.slip);
         let turned = across(&self.normal, self.slip);
         let size = length(turned);
