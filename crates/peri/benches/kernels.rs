@@ -8,7 +8,7 @@ use peri::stress::{BallVolume, Loaded, Measure, Missing, piola_in_cloud};
 
 mod kernel;
 
-/// Particles: what the caches hold.
+/// Numbers of particles that fit into the caches.
 const SIZE: f64 = 1e4;
 
 fn dimension<const D: usize>(criterion: &mut Criterion) -> Result<(), peri::Error> {

@@ -1,4 +1,4 @@
-//! Lattices on a device against the kernel of the host.
+//! Lattices on a device, compared with the kernel of the host.
 
 #[path = "it/bodies.rs"]
 #[allow(dead_code)] // of what all tests share
@@ -18,14 +18,15 @@ use peri::solver::{Breaking, Method, Policy, State, System, VelocityVerlet};
 
 const DENSITY: f64 = 2.3;
 
-/// Every precision of this machine's device; says that the test is skipped where there is none.
+/// Returns every precision of this machine's device; reports a skipped test without a device.
 #[track_caller]
 fn devices() -> Vec<Device> {
     let open = |precision| Device::portable()?.with_precision(precision);
     let found: Vec<Device> = [Precision::Single, Precision::Double].map(open).into_iter().flatten().collect();
     if found.is_empty() {
         evidence::skipped(
-            "a device behind Vulkan, Metal or DirectX 12 (a program that stands for one: mesa-vulkan-drivers)",
+            "a device behind Vulkan, Metal or DirectX 12 (a program that stands for one: \
+             mesa-vulkan-drivers)",
         );
     }
     found
@@ -40,13 +41,13 @@ fn random<const D: usize>(bonds: &LatticeBonds<D>, size: f64) -> Field<D> {
     field
 }
 
-/// Two slits and a hole; no correction that devices do not know.
+/// A body with two slits and a hole, without corrections.
 fn damaged<const D: usize>(cells: [usize; D]) -> LatticeBonds<D> {
     Body { surface: None, ..Body::damaged(cells, 1e-3, 3.015) }.build().lattice
 }
 
-/// What rounding of displacements, of the law and of sums may make of a particle's force: with c = 2kθ w V/|ξ| and the rounding
-/// ε|ξ + η|(|u_I| + |u_J|) of E, of which q is a function, Σ_J c (|q| + |q′| |δE|/ε + |q|)|ζ|.
+/// Bound of the rounding error of a particle's force, from displacements, law and sums: Σ_J c (|q| + |q′|
+/// |δE|/ε + |q|)|ζ| with c = 2kθ w V/|ξ| and the rounding ε|ξ + η|(|u_I| + |u_J|) of E, on which q depends.
 fn sizes<const D: usize>(bonds: &LatticeBonds<D>, law: &KernelFit, u: &Field<D>) -> Vec<f64> {
     let of = |site: u32| {
         let mut size = 0.0;
@@ -87,7 +88,8 @@ fn compare_forces<const D: usize>(device: &Device, cells: [usize; D]) {
             // a particle without bonds has neither
             worst = worst.max(if apart == 0.0 { 0.0 } else { apart / (size * device.precision().epsilon()) });
         }
-        // a bond's force is rounded in ten to fifty operations, each by up to ½ε, in directions that have nothing in common
+        // a bond's force is rounded in ten to fifty operations, each by up to ½ε, in directions that have
+        // nothing in common
         let name =
             format!("{D}D {} forces of {} in {:?}, in ε Σ|f|", law.name(), device.name(), device.precision());
         eprintln!("{name}: {worst:.2}");
@@ -103,8 +105,8 @@ fn gpu_forces_are_those_of_the_host() {
     }
 }
 
-/// A slit sheet or block that stretches evenly at first and whose ends go on to do so: bonds break beside slits and hole, on both
-/// sides the same.
+/// A slit sheet or block with initially uniform stretch and moving ends: device and host break the same
+/// bonds.
 fn compare_motion<const D: usize>(device: &Device, cells: [usize; D], critical: f64) {
     const STEPS: u64 = 60;
     let law = Law::ChainOffset.build(720.0, 1200.0, false).unwrap();
@@ -172,8 +174,8 @@ fn compare_motion<const D: usize>(device: &Device, cells: [usize; D], critical: 
         let (a, b) = (motion.displacement.get(site as usize), state.displacement.get(site as usize));
         apart = apart.max(norm::<D>(std::array::from_fn(|d| a[d] - b[d])));
     }
-    // every step rounds u and vΔt by ½ε of them, at random: ½ε√n of u each; four times that. The law on each side is within
-    // 1e-9 of the true one
+    // every step rounds u and vΔt by ½ε of them, at random: ½ε√n of u each; four times that. The law on each
+    // side is within 1e-9 of the true one
     let allowed = 4.0 * (STEPS as f64).sqrt() * device.precision().epsilon().max(1e-9) * reach;
     let name = format!("{D}D motion on {} in {:?}, m", device.name(), device.precision());
     let broken = state.fracture.broken;
@@ -194,7 +196,7 @@ fn gpu_motion_breaks_the_same_bonds() {
     }
 }
 
-/// One particle moves in a straight line; a body without one is no body.
+/// A single particle moves in a straight line; a body without particles is refused.
 #[test]
 fn gpu_smallest_bodies() {
     devices().iter().for_each(smallest_bodies);
@@ -228,7 +230,7 @@ fn smallest_bodies(device: &Device) {
     assert!(LatticeBonds::new(empty, 3.015, VolumeCorrection::None, &[]).is_err());
 }
 
-/// What kernels cannot do is refused, and what is not finite is found, each by name.
+/// Unsupported bodies and values that are not finite are refused by name.
 #[test]
 fn gpu_refusals() {
     let Some(device) = devices().pop() else { return };
@@ -274,7 +276,7 @@ fn gpu_refusals() {
     assert!(body.start(&start).unwrap_err().to_string().contains("time step: found 0"));
 }
 
-/// A body that does not fit is refused by the name of what does not.
+/// A body larger than the memory of the device is refused.
 #[test]
 fn gpu_bodies_beyond_the_memory() {
     let Some(device) = devices().pop() else { return };
@@ -282,7 +284,8 @@ fn gpu_bodies_beyond_the_memory() {
     if most > 1 << 25 {
         return evidence::skipped("a device with small buffers");
     }
-    // three sites a cell, with the empty ones on either side of the row: within the limit in single precision, beyond it in double
+    // three sites a cell, with the empty ones on either side of the row: within the limit in single
+    // precision, beyond it in double
     let cells = [most as usize / 2, 1];
     let row = Lattice { spacing: 1.0, origin: [0.5; 2], cells, occupied: vec![true; cells[0]], volume: 1.0 };
     let bonds = LatticeBonds::new(row, 1.0, VolumeCorrection::None, &[]).unwrap();

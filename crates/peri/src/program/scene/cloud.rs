@@ -180,8 +180,9 @@ fn read<const D: usize>(source: &Source, path: &Path) -> Result<CloudPoints<D>, 
     Ok((positions, volumes))
 }
 
-/// Refuses a horizon with so many bonds that memory does not suffice. Counts points in cells as wide as the horizon: the
-/// block of 3^D cells around a point contains its ball, and about (block/ball) times as many points.
+/// Refuses a horizon with so many bonds that memory does not suffice. Counts points in cells as wide as the
+/// horizon: the block of 3^D cells around a point contains its ball, and about (block/ball) times as many
+/// points.
 fn refuse_too_many_bonds<const D: usize>(
     source: &Source,
     positions: &[[f64; D]],
