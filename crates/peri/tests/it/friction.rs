@@ -8,7 +8,7 @@ use peri::contact::{Contact, Plane, SHORT_RANGE};
 use peri::field::{CHUNK, Field};
 use peri::material::BondMaterial;
 use peri::potential::Law;
-use peri::solver::{Loads, Record, State, Support, System, VelocityVerlet};
+use peri::solver::{Loads, Method, Record, State, Support, System, VelocityVerlet};
 use peri::surface::Surface;
 
 const G: f64 = 9.81;

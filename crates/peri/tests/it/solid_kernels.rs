@@ -3,9 +3,7 @@
 use crate::bodies::{Random, scatter};
 use crate::solids::{displaced, neo_hooke, rubber};
 use evidence::at_most;
-use peri::bonds::{
-    BodyGeometry, BondDamage, Bonds, LatticeBonds, Overstretched, StretchRange, VolumeCorrection,
-};
+use peri::bonds::{BodyGeometry, BondDamage, LatticeBonds, Overstretched, StretchRange, VolumeCorrection};
 use peri::calibrate::Space;
 use peri::field::Field;
 use peri::geometry::{Operation, Shape, lattice};

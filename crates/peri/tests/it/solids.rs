@@ -9,7 +9,8 @@ use peri::calibrate::Space;
 use peri::field::Field;
 use peri::geometry::{Operation, Shape, lattice};
 use peri::material::{
-    Correspondence, Deformation, EightChain, Family, NonlocalSolid, PointLaw, Pointwise, Response, Tensor,
+    Correspondence, Deformation, EightChain, Family, Material, NonlocalSolid, PointLaw, Pointwise, Response,
+    Tensor,
 };
 use polycore::constitutive::hyperelastic::{Compressible, NeoHookean, Volumetric};
 

@@ -169,8 +169,8 @@ impl<const D: usize> LammpsModel<'_, D> {
     pub(super) fn input(&self, points: usize) -> String {
         let mut text = format!(
             "# written by `peri export lammps`; lengths in mm, forces in N\n\
-             variable cutoff index {cutoff}\nunits lj\ndimension {D}\nboundary {boundary}\nnewton \
-             on\natom_style bond\n\
+             variable cutoff index {cutoff}\nunits lj\ndimension {D}\nboundary {boundary}\n\
+             newton on\natom_style bond\n\
              atom_modify map array\ncomm_modify cutoff ${{cutoff}}\nspecial_bonds lj 0 1 1 coul 0 1 1\n\
              bond_style table spline {points}\nfix broken all property/atom i_broken\nread_data peri.data\n",
             cutoff = self.cutoff(),
@@ -191,8 +191,8 @@ impl<const D: usize> LammpsModel<'_, D> {
         }
         text +=
             "variable marks atom i_broken\ncompute cut all reduce sum v_marks\nvariable cut equal c_cut\n";
-        text += "thermo_style custom step bonds ebond fnorm v_cut\nthermo_modify norm no lost error\nthermo \
-            100000\n";
+        text += "thermo_style custom step bonds ebond fnorm v_cut\nthermo_modify norm no lost error\n\
+                 thermo 100000\n";
         text += &format!("min_style fire\nmin_modify dmax {}\ntimestep 0.05\n", 0.5 * self.spacing * MM);
         text
     }
