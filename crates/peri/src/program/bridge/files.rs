@@ -218,7 +218,8 @@ impl<const D: usize> LammpsModel<'_, D> {
             "format": "peri-lammps 1", "dimension": D, "clamps": clamps, "regions": regions,
             "lengths_mm": self.types.iter().map(|kind| kind.length * MM).collect::<Vec<f64>>(),
             "critical_stretch": self.critical, "factors": factors, "reach_mm": self.reach * MM,
-            "tolerance": scene.tolerance(), "stop_below": scene.solver.stop_below.map_or(0.0, |part| part.si()),
+            "tolerance": scene.tolerance(),
+            "stop_below": scene.solver.stop_below.map_or(0.0, |part| part.si()),
             "every": scene.output.every.unwrap_or(factors.len()).max(1), "cutoff_mm": self.cutoff(),
             "predictor": self.predictor.iter().map(|row| row.to_vec()).collect::<Vec<_>>(),
         })
