@@ -172,6 +172,9 @@ impl SceneError {
 
     pub(super) fn missing(source: &Source, key: String, span: Range<usize>, why: &str) -> Self {
         let message = format!("missing `{key}`: {why}");
+        // a block that the file lacks belongs to its end
+        let end = source.text.trim_end().len();
+        let span = if span.is_empty() { end.saturating_sub(1)..end } else { span };
         Self::at(source, "scene::missing_key", Some(key), span, message).label("needed here")
     }
 

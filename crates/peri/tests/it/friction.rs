@@ -1,7 +1,7 @@
-//! Coulomb friction and rigid planes: closed forms of a particle, a bar and a block on a plane, plain sums,
+//! Coulomb friction and rigid planes in explicit dynamics: closed forms of a particle, plain sums,
 //! balances.
 
-use crate::bodies::{Body, MODULUS, Random, Slit, hold, norm};
+use crate::bodies::{Body, MODULUS, Random, Slit, norm};
 use crate::dynamics::DENSITY;
 use peri::Error;
 use peri::bonds::{BodyGeometry, Bonds, CloudBonds, VolumeCorrection};
@@ -16,13 +16,13 @@ use peri::surface::BodySurface;
 
 const G: f64 = 9.81;
 
-/// Contact with planes, of a body of shapes, with M = 1 Pa.
-fn beside(bonds: &dyn Bonds<2>, pairs: f64, planes: Vec<RigidPlane<2>>) -> Contact<2> {
+/// Builds the contact of a body with planes, with M = 1 Pa.
+pub fn beside(bonds: &dyn Bonds<2>, pairs: f64, planes: Vec<RigidPlane<2>>) -> Contact<2> {
     let contact = Contact::short_range(bonds, MODULUS, pairs).unwrap();
     contact.with_planes(bonds, &BodySurface::default(), 1.0, planes).unwrap()
 }
 
-/// Linear bonds, explicit dynamics.
+/// Runs explicit dynamics with linear bonds.
 fn run(
     solver: &VelocityVerlet,
     bonds: &mut dyn Bonds<2>,
@@ -135,8 +135,8 @@ fn slides_down() {
     }
 }
 
-/// A sticking particle oscillates about its elastic slip mg sin θ/k_t by as much, and does not creep: as far
-/// after ten times the time.
+/// A sticking particle swings about its elastic slip mg sin θ/k_t and does not creep: the same distance after
+/// ten times the time.
 #[test]
 fn sticks_without_creep() {
     for (degrees, mu) in [(10.0_f64, 0.3), (20.0, 0.5), (20.0, 10.0)] {
@@ -167,7 +167,7 @@ fn stops_after() {
     }
 }
 
-/// Drags a particle on a belt until it has the belt's velocity V; half of the belt's work mV² becomes heat.
+/// A belt drags a particle until it has the velocity V of the belt; half of the work mV² becomes heat.
 #[test]
 fn belt_drags() {
     let incline = Incline { theta: 0.0, mu: 0.4, v0: 0.0, time: 1.0, step: 1e-4, belt: 1.5 };
@@ -312,8 +312,8 @@ fn plane_hits_a_particle() {
     }
 }
 
-/// Peridigm's verification test Contact_Friction, Coulomb's law itself: two particles that repel each other
-/// and rub.
+/// Verification test Contact_Friction of Peridigm, with Coulomb's law: two particles that repel each other
+/// with friction.
 #[test]
 fn two_particles_of_peridigm() {
     let (side, modulus, reach, horizon) = (0.1612_f64, 1e12, 0.2, 0.6_f64);
@@ -341,7 +341,8 @@ fn two_particles_of_peridigm() {
     assert!((v[1] / -41.4843659641 - 1.0).abs() < 1e-8, "{v:?}");
 }
 
-/// Friction between particles against a plain sum over all pairs, of velocities, slips and bounds at random;
+/// Friction between particles agrees with a plain sum over all pairs, for random velocities, slips and
+/// bounds;
 /// Σ V f = 0.
 fn friction_of_a_heap<const D: usize>(cells: [usize; D]) {
     let body = Body::<D>::solid(cells, 0.3, 1.015);
@@ -405,7 +406,8 @@ fn friction_is_a_plain_sum() {
     friction_of_a_heap([6, 5, 4]);
 }
 
-/// Two halves of a sheet that collide askew over a rough plane that moves: on any number of threads, and from
+/// Two halves of a sheet collide obliquely over a moving rough plane: equal bits on any number of threads,
+/// and from
 /// a state saved while they touch.
 #[test]
 fn neither_threads_nor_restarts_change_a_bit() {
@@ -584,7 +586,7 @@ fn refuses() {
     assert!(fault(far).unwrap().contains("no face of the body within half a spacing"));
 }
 
-/// A plane through the middle of a body drives its two halves apart, in motion and at rest; everything stays
+/// A plane through the middle of a body drives its halves apart; everything stays
 /// finite.
 #[test]
 fn plane_through_a_body() {

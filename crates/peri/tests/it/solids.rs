@@ -1,12 +1,10 @@
-//! Solids with any Poisson ratio: the battery of all materials, the state of every particle as an independent
-//! program wrote it (`docs/reference/correspondence`; `solid_*.csv`, 13 digits), and closed forms.
+//! Solids with any Poisson ratio: checks of all materials, the state of every particle by an independent
+//! program (`docs/reference/correspondence`; `solid_*.csv`, 13 digits), and closed forms.
 
 use crate::bodies::{Body, Random, scatter};
 use crate::materials::battery;
 use evidence::{at_most, near};
-use peri::bonds::{
-    BodyGeometry, BondDamage, Bonds, LatticeBonds, Overstretched, StretchRange, VolumeCorrection,
-};
+use peri::bonds::{BodyGeometry, BondDamage, Bonds, LatticeBonds, Overstretched, VolumeCorrection};
 use peri::calibrate::Space;
 use peri::field::Field;
 use peri::geometry::{Operation, Shape, lattice};
@@ -16,7 +14,7 @@ use peri::material::{
 };
 use polycore::constitutive::hyperelastic::{Compressible, NeoHookean, Volumetric};
 
-/// W = ½μ(I₁ − 3 − 2 ln J) + ¼κ(J² − 1 − 2 ln J), μ = 1, of a bulk modulus K.
+/// Returns W = ½μ(I₁ − 3 − 2 ln J) + ¼κ(J² − 1 − 2 ln J), μ = 1, of a bulk modulus K.
 pub fn neo_hooke<const D: usize>(
     space: Space,
     bulk: f64,
@@ -58,10 +56,10 @@ fn solids_pass_the_battery() {
     println!("λmax(K)/s V of all solids: {greatest:.3}; the bound is 2");
 }
 
-/// A block of the independent program: cells of edge 1, the first at the origin.
+/// Block of the independent program: cells of edge 1, the first at the origin.
 struct Block<const D: usize> {
     bonds: LatticeBonds<D>,
-    /// Sites in the program's order, whose last axis is the fastest.
+    /// Sites in the order of the program, whose last axis varies fastest.
     order: Vec<usize>,
     displacement: Field<D>,
     rows: Vec<Vec<f64>>,
@@ -105,7 +103,8 @@ impl<const D: usize> Block<D> {
         self.bonds.break_bonds(&list);
     }
 
-    /// The largest differences of f, F, W and I from the program's, over the largest of each; ΣE over all
+    /// Returns the largest differences of f, F, W and I from the program, over the largest of each, and ΣE
+    /// over all
     /// particles.
     fn compare<L: PointLaw<D> + Clone>(
         &mut self,
@@ -146,7 +145,7 @@ impl<const D: usize> Block<D> {
     }
 }
 
-/// The displacement of the independent program's blocks.
+/// Returns the displacement of the blocks of the independent program.
 pub fn displaced<const D: usize>(position: [f64; D]) -> [f64; D] {
     let [x, y] = [position[0], position[1]];
     let z = if D == 3 { position[2] } else { 0.0 };
@@ -158,7 +157,7 @@ pub fn displaced<const D: usize>(position: [f64; D]) -> [f64; D] {
     std::array::from_fn(|d| all[d])
 }
 
-/// Energies, forces, gradients and integrities of every particle: corr.py's, to its 13 digits.
+/// Energies, forces, gradients and integrities of every particle agree with the 13 digits of corr.py.
 #[test]
 fn every_particle_agrees_with_an_independent_program() {
     let third = 5.0 / 3.0;
@@ -186,8 +185,8 @@ fn every_particle_agrees_with_an_independent_program() {
     }
 }
 
-/// A neo-Hookean network is the same solid by both ways: W_S = ½μ is the constant stabilisation of
-/// correspondence. With n → ∞ the chains have μ(I₁) = μ₀ up to 1/n.
+/// A neo-Hookean network equals its correspondence solid: W_S = ½μ is the constant stabilisation. With n → ∞
+/// the chains have μ(I₁) = μ₀ up to 1/n.
 #[test]
 fn long_chains_are_neo_hookean() {
     let body = Body::<2>::damaged([9, 8], 1.0, 3.015);
@@ -212,7 +211,7 @@ fn long_chains_are_neo_hookean() {
     at_most("solid_long_chains_neo_hooke", apart, 1e-7);
 }
 
-/// F of a homogeneous deformation.
+/// Returns F of a homogeneous deformation.
 fn homogeneous<const D: usize>(stretches: [f64; D]) -> Deformation<D> {
     let gradient = BodyTensor::<D>::from_fn(|a, b| if a == b { stretches[a] - 1.0 } else { 0.0 });
     Deformation { displacement_gradient: gradient, residual: 0.0 }
@@ -241,7 +240,7 @@ fn nominal_stresses_of_the_network() {
     }
 }
 
-/// P/μ₀ at l = 2 where the sides are free: 3D, plane strain, plane stress with a finite K.
+/// P/μ₀ at l = 2 with free sides: 3D, plane strain, plane stress with a finite K.
 #[test]
 fn free_sides_follow_the_bulk_modulus() {
     fn pulled<const D: usize>(law: &EightChainSolid<D>) -> f64 {
@@ -324,8 +323,9 @@ fn a_homogeneous_deformation_is_exact_everywhere() {
 
 /// A strip bonded to plates, w/h = 4, pressed by 1 %: finite elements (`docs/reference/eight_chain/strip.py`)
 /// have 2.913μ at K/μ = 5/3 and 16.49μ at 100, where all of the stiffness comes from the volume. Plates of
-/// particles give way over a horizon, so that errors are of first order: 12.6 % and 6.9 % at 16 particles
-/// over the height, half of the former beyond.
+/// particles are compliant over a horizon, so that errors are of first order: 12.6 % and 6.9 % at 16
+/// particles
+/// over the height.
 #[test]
 fn a_bonded_strip_is_stiff_because_it_keeps_its_volume() {
     let (height, shear) = (8e-3, 0.4e6);
@@ -357,7 +357,7 @@ fn energies_of_small_strains_keep_their_digits() {
     at_most("eight_chain_energy_small_strain", worst_plane.max(solid), 2e-6);
 }
 
-/// Energy and its slope of a sheet crushed to nothing belong together.
+/// The force of a crushed sheet is the slope of its energy.
 #[test]
 fn crushed_sheets_have_the_energy_of_their_force() {
     let law = EightChainSolid::<2>::new(Space::PlaneStress, 1.0, 400.0, 10.0).unwrap();

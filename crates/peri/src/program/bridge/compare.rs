@@ -18,7 +18,8 @@ pub struct Comparison {
     pub largest: f64,
 }
 
-/// Runs LAMMPS on the self-check state of an exported folder, on one rank, and on two if there is an `mpiexec`.
+/// Runs LAMMPS on the self-check state of an exported folder, on one rank, and on two if there is an
+/// `mpiexec`.
 ///
 /// # Errors
 /// A folder without an export, a `python` without LAMMPS, a run that fails.
@@ -39,7 +40,8 @@ pub fn compare(folder: &Path, python: &Path) -> Result<Vec<Comparison>, Error> {
     Ok(found)
 }
 
-/// Finds a program by name: in the active virtual environment, else the first on the path, so that MPI beside it is found.
+/// Finds a program by name: in the active virtual environment, else the first on the path, so that MPI beside
+/// it is found.
 fn find_program(name: &Path, active: Option<OsString>, path: Option<OsString>) -> PathBuf {
     let own = active.into_iter().map(|folder| PathBuf::from(folder).join("bin"));
     let paths = path.iter().flat_map(std::env::split_paths);
@@ -124,7 +126,8 @@ fn forces<'a>(
     Ok(rows)
 }
 
-/// Finds the `mpiexec` beside `python`, with which its LAMMPS was installed; for a bare name of `python` the first on the path.
+/// Finds the `mpiexec` beside `python`, with which its LAMMPS was installed; for a bare name of `python` the
+/// first on the path.
 fn mpiexec(python: &Path) -> Option<PathBuf> {
     let beside = python.parent().map(|folder| folder.join("mpiexec"));
     if let Some(beside) = beside.filter(|path| path.is_file() && path.components().count() > 1) {

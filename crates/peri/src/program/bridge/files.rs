@@ -44,7 +44,8 @@ pub(super) fn write<const D: usize>(
     Ok(())
 }
 
-/// Law of the tables: beyond `switch` it continues linearly without falling, because LAMMPS aborts outside a table.
+/// Law of the tables: beyond `switch` it continues linearly without falling, because LAMMPS aborts outside a
+/// table.
 struct ContinuedLaw<'a> {
     law: &'a dyn BondPotential,
     switch: f64,
@@ -73,8 +74,8 @@ impl ContinuedLaw<'_> {
 }
 
 impl<const D: usize> LammpsModel<'_, D> {
-    /// Returns the largest stretch of the tables: the shortest bond across the widest gap; without breaking, several times the
-    /// mean stretch.
+    /// Returns the largest stretch of the tables: the shortest bond across the widest gap; without breaking,
+    /// several times the mean stretch.
     pub(super) fn largest_stretch(&self) -> f64 {
         match self.critical {
             Some(critical) => (2.0 * critical).max(2.0 + 1.1 * self.reach / self.spacing),
@@ -127,7 +128,8 @@ impl<const D: usize> LammpsModel<'_, D> {
         Ok(())
     }
 
-    /// Writes tables of force −2 kθ t w V_I V_J, N, and energy, N mm, over the length, mm, for each reference length.
+    /// Writes tables of force −2 kθ t w V_I V_J, N, and energy, N mm, over the length, mm, for each reference
+    /// length.
     pub(super) fn write_tables(&self, points: usize, file: &mut impl Write) -> std::io::Result<()> {
         let (law, longest) = (self.law(), self.largest_stretch());
         let slope = |l: f64| if l > law.switch { law.slope() } else { self.law.tension_derivative(l) };
@@ -149,8 +151,8 @@ impl<const D: usize> LammpsModel<'_, D> {
         Ok(())
     }
 
-    /// Returns the mass of particles with which FIRE's time step of 0.05 grows (at most ten-fold) to 0.8 of the critical step 2/ω
-    /// of small strains: ω² ≤ 2 Σ|stiffness|/m.
+    /// Returns the mass of particles with which FIRE's time step of 0.05 grows (at most ten-fold) to 0.8 of
+    /// the critical step 2/ω of small strains: ω² ≤ 2 Σ|stiffness|/m.
     fn mass(&self) -> f64 {
         let mut sums = vec![0.0; self.positions.len()];
         for &(kind, a, b) in &self.bonds {
@@ -167,7 +169,8 @@ impl<const D: usize> LammpsModel<'_, D> {
     pub(super) fn input(&self, points: usize) -> String {
         let mut text = format!(
             "# written by `peri export lammps`; lengths in mm, forces in N\n\
-             variable cutoff index {cutoff}\nunits lj\ndimension {D}\nboundary {boundary}\nnewton on\natom_style bond\n\
+             variable cutoff index {cutoff}\nunits lj\ndimension {D}\nboundary {boundary}\n\
+             newton on\natom_style bond\n\
              atom_modify map array\ncomm_modify cutoff ${{cutoff}}\nspecial_bonds lj 0 1 1 coul 0 1 1\n\
              bond_style table spline {points}\nfix broken all property/atom i_broken\nread_data peri.data\n",
             cutoff = self.cutoff(),
@@ -188,7 +191,8 @@ impl<const D: usize> LammpsModel<'_, D> {
         }
         text +=
             "variable marks atom i_broken\ncompute cut all reduce sum v_marks\nvariable cut equal c_cut\n";
-        text += "thermo_style custom step bonds ebond fnorm v_cut\nthermo_modify norm no lost error\nthermo 100000\n";
+        text += "thermo_style custom step bonds ebond fnorm v_cut\nthermo_modify norm no lost error\n\
+                 thermo 100000\n";
         text += &format!("min_style fire\nmin_modify dmax {}\ntimestep 0.05\n", 0.5 * self.spacing * MM);
         text
     }
@@ -214,7 +218,8 @@ impl<const D: usize> LammpsModel<'_, D> {
             "format": "peri-lammps 1", "dimension": D, "clamps": clamps, "regions": regions,
             "lengths_mm": self.types.iter().map(|kind| kind.length * MM).collect::<Vec<f64>>(),
             "critical_stretch": self.critical, "factors": factors, "reach_mm": self.reach * MM,
-            "tolerance": scene.tolerance(), "stop_below": scene.solver.stop_below.unwrap_or(0.0),
+            "tolerance": scene.tolerance(),
+            "stop_below": scene.solver.stop_below.map_or(0.0, |part| part.si()),
             "every": scene.output.every.unwrap_or(factors.len()).max(1), "cutoff_mm": self.cutoff(),
             "predictor": self.predictor.iter().map(|row| row.to_vec()).collect::<Vec<_>>(),
         })

@@ -26,8 +26,8 @@ struct ExportHeader {
 const NAMES: [(&str, &str); 3] =
     [("residual", "out_of_balance"), ("rounds", "equilibria"), ("broken", "broken_bonds")];
 
-/// Reads the results of `drive.py` in `folder`, and writes history.csv, load.png, fields.vtkhdf and report.json into `output`.
-/// Judges the expectations of the scene whose values LAMMPS gives.
+/// Reads the results of `drive.py` in `folder`, and writes history.csv, load.png, fields.vtkhdf and
+/// report.json into `output`. Judges the expectations of the scene whose values LAMMPS gives.
 ///
 /// # Errors
 /// A folder without an export or without steps, a truncated file, results that cannot be written.

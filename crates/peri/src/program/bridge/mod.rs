@@ -1,5 +1,5 @@
-//! Exchange with LAMMPS. On a lattice a bond law has few reference lengths and forces that depend on the current length only,
-//! so that one `bond_style table` per length represents the model exactly.
+//! Exchange with LAMMPS. On a lattice a bond law has few reference lengths and forces that depend on the
+//! current length only, so that one `bond_style table` per length represents the model exactly.
 
 mod compare;
 mod files;
@@ -21,8 +21,8 @@ use crate::solver::{Criterion, Loads};
 use harness::scene::Source;
 use std::path::Path;
 
-/// Writes a variant of a scene for LAMMPS into `output`: body, tables, input, driver, self-check state, README.
-/// `variant` may be `None` for a scene with one variant.
+/// Writes a variant of a scene for LAMMPS into `output`: body, tables, input, driver, self-check state,
+/// README. `variant` may be `None` for a scene with one variant.
 ///
 /// # Errors
 /// A [`harness::scene::SceneError`] for a scene that tables cannot represent; files that cannot be written.
@@ -228,7 +228,8 @@ impl<'a, const D: usize> LammpsModel<'a, D> {
         forces
     }
 
-    /// Returns the self-check state: pseudo-random displacements below a tenth of the spacing that break no bond.
+    /// Returns the self-check state: pseudo-random displacements below a tenth of the spacing that break no
+    /// bond.
     pub(crate) fn check_state(&self) -> Vec<[f64; D]> {
         let room = self.critical.map_or(1.0, |critical| critical - 1.0);
         let amplitude = self.spacing * (0.2 * room).min(0.1);

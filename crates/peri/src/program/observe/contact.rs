@@ -68,7 +68,8 @@ pub(super) fn warnings<const D: usize>(m: &Moment<D>) -> Vec<String> {
         let (stiffness, deepest) = (contact_stiffness(contact, m.scene), deepest_overlap(m));
         if share > SOFT_SHARE && m.scene.dynamics.is_none() {
             warnings.push(format!(
-                "contact holds {:.1} % of the stored energy, and the load is too low by about that much: raise `stiffness` from \
+                "contact holds {:.1} % of the stored energy, and the load is too low by about that much: \
+                 raise `stiffness` from \
                  {stiffness} to {:.0}",
                 100.0 * share,
                 stiffness * share / ADVISED_SHARE
@@ -76,7 +77,8 @@ pub(super) fn warnings<const D: usize>(m: &Moment<D>) -> Vec<String> {
         }
         if deepest > 0.5 {
             warnings.push(format!(
-                "a contact overlaps by {deepest:.2} of half a spacing: raise `contact.stiffness` or reduce the spacing"
+                "a contact overlaps by {deepest:.2} of half a spacing: raise `contact.stiffness` or reduce \
+                 the spacing"
             ));
         }
     }

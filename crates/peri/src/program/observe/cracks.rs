@@ -40,7 +40,8 @@ pub(super) fn damage_field<const D: usize>(scene: &Scene, to: &mut Fields<Moment
     }
 }
 
-/// Observer of new cracks: their area, the dissipated energy over it, and its ratio to the tearing energy of the body.
+/// Observer of new cracks: their area, the dissipated energy over it, and its ratio to the tearing energy of
+/// the body.
 pub(super) struct NewCracks<'s> {
     scene: &'s Scene,
     /// Area, m², and dissipated energy over it, J/m².

@@ -52,8 +52,8 @@ pub fn quantities_of(source: &Source, scene: &Scene) -> Result<Vec<String>, Scen
     Ok(names)
 }
 
-/// Checks a scene and returns its variants; refuses expectations of scalars that the report lacks, and probes whose values have
-/// names of other scalars.
+/// Checks a scene and returns its variants; refuses expectations of scalars that the report lacks, and probes
+/// whose values have names of other scalars.
 ///
 /// # Errors
 /// As [`scene::check`]; an unknown name, with the most similar ones.

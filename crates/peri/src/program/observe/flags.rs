@@ -38,12 +38,14 @@ pub(super) fn warnings<const D: usize>(m: &Moment<D>) -> Vec<String> {
     let steps = if m.scene.dynamics.is_some() { "row" } else { "step" };
     let warning = match (first_row(m, column), first_row(m, column + 1)) {
         (Some(left), _) => format!(
-            "the learnt law leaves the box of its training data from {steps} {left} on; in the last {steps} in {:.3} % of the \
+            "the learnt law leaves the box of its training data from {steps} {left} on; in the last {steps} \
+             in {:.3} % of the \
              particles",
             100.0 * outside
         ),
         (None, Some(any)) => format!(
-            "the learnt law is uncertain inside the box of its training data from {steps} {any} on; in the last {steps} in {:.3} % \
+            "the learnt law is uncertain inside the box of its training data from {steps} {any} on; in the \
+             last {steps} in {:.3} % \
              of the particles",
             100.0 * flagged
         ),
@@ -62,8 +64,8 @@ pub(super) fn flag_field<const D: usize>(scene: &Scene, to: &mut Fields<Moment<D
     }
 }
 
-/// Encodes flags as a sum: 1 for a component of C outside the box of the training data, 2 for a component that never changed
-/// there, 4 for a gap in the data, 8 for members that disagree.
+/// Encodes flags as a sum: 1 for a component of C outside the box of the training data, 2 for a component
+/// that never changed there, 4 for a gap in the data, 8 for members that disagree.
 fn encode(flags: &Flags) -> f64 {
     let reasons = [flags.outside.contains(&true), flags.unseen.contains(&true), flags.far, flags.spread];
     reasons.iter().zip([1.0, 2.0, 4.0, 8.0]).map(|(&given, bit)| if given { bit } else { 0.0 }).sum()

@@ -25,7 +25,8 @@ fn is_written<const D: usize>(every: usize, state: &State<D>, rows: usize) -> bo
     rows > 0 && (prescribed || history[rows - 1].broken > before)
 }
 
-/// Returns true if an equilibrium within a step is written: the 1st, 2nd, 3rd, 4th, 6th, 8th, 12th, 16th, 24th, …
+/// Returns true if an equilibrium within a step is written: the 1st, 2nd, 3rd, 4th, 6th, 8th, 12th, 16th,
+/// 24th, …
 fn is_stage(equilibrium: u64) -> bool {
     equilibrium.is_power_of_two() || (equilibrium.is_multiple_of(3) && (equilibrium / 3).is_power_of_two())
 }
@@ -55,7 +56,8 @@ pub(super) fn tensor_in_space<const D: usize>(t: &StressTensor<D>) -> [f64; 9] {
     std::array::from_fn(|k| t.get(k / 3).and_then(|row| row.get(k % 3)).copied().unwrap_or(0.0))
 }
 
-/// Adds displacements, and for a cloud the index of each particle in the input file: particles are sorted for locality.
+/// Adds displacements, and for a cloud the index of each particle in the input file: particles are sorted for
+/// locality.
 pub(super) fn displacement_fields<const D: usize>(scene: &Scene, to: &mut Fields<Moment<D>>) {
     to.add("displacement", 3, Place::Points, |m| {
         let each: Vec<[f64; 3]> = m.sites().map(|site| in_space(m.state.displacement.get(site))).collect();
@@ -103,7 +105,8 @@ impl FieldFrames {
         Ok(Self { series, written: every.and_then(last) })
     }
 
-    /// Writes the fields after a step, or after an equilibrium in which bonds broke, if the scene requests them.
+    /// Writes the fields after a step, or after an equilibrium in which bonds broke, if the scene requests
+    /// them.
     ///
     /// # Errors
     /// Files that cannot be written.
@@ -161,8 +164,8 @@ impl FieldFrames {
             fields.map(|field| (&*field.name, field.components, &*field.values)).collect();
         // between two steps the load is unknown
         let record = m.state.history.last().filter(|_| time.fract() == 0.0);
-        let of = |get: fn(&StepRecord) -> f64| record.map_or(f64::NAN, get);
-        let moments = [("displacement", of(|r| r.displacement)), ("load", of(|r| r.load))];
+        let value = |get: fn(&StepRecord) -> f64| record.map_or(f64::NAN, get);
+        let moments = [("displacement", value(|r| r.displacement)), ("load", value(|r| r.load))];
         series.moment(time, &points, &data, &moments)?;
         Ok(())
     }

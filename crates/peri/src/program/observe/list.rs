@@ -11,7 +11,8 @@ use harness::report::Named;
 /// Returns the observers of a scene; they need no body yet.
 pub fn observers<const D: usize>(scene: &Scene) -> SceneObservers<'_, D> {
     let stateless = |functions| {
-        Box::new(StatelessObserver { scene, ..functions }) as Box<dyn for<'m> Observer<Moment<'m, D>, Error> + '_>
+        Box::new(StatelessObserver { scene, ..functions })
+            as Box<dyn for<'m> Observer<Moment<'m, D>, Error> + '_>
     };
     let none = StatelessObserver::empty(scene);
     vec![
@@ -37,7 +38,8 @@ pub fn observers<const D: usize>(scene: &Scene) -> SceneObservers<'_, D> {
     ]
 }
 
-/// Returns the scalars that a run of a scene without studies can report; some depend on events, such as `first_break`.
+/// Returns the scalars that a run of a scene without studies can report; some depend on events, such as
+/// `first_break`.
 pub fn quantities(scene: &Scene) -> Vec<Named> {
     match scene.body.space {
         Space::Solid => names(&observers::<3>(scene)),

@@ -65,10 +65,10 @@ fn maps<const D: usize>(m: &Moment<D>, output: &Path) -> Result<(), Error> {
         let label = format!("{name}{unit}");
         // in a torn body these are residual stresses of its pieces
         let last = m.state.history.last().filter(|last| last.broken > 0);
-        let at = last.map_or(String::new(), |r| {
+        let moment = last.map_or(String::new(), |r| {
             format!(", U = {} mm, F = {} N", short(r.displacement * 1e3), short(r.load))
         });
-        let title = format!("{label}, {}{at}", measure.name());
+        let title = format!("{label}, {}{moment}", measure.name());
         let panel = Panel::new(&title, &label, &places, values, m.bonds.spacing()).reference(&rest);
         map = map.panel(panel.bridge(bridge_length(m)));
     }

@@ -176,7 +176,8 @@ pub struct Physics<const D: usize> {
     rows: Vec<RowPart<D>>,
     /// Evaluator of forces and stresses; this and the following fields are set by [`Self::begin`].
     pub evaluator: StressEvaluator<D>,
-    /// Bonds of each particle without cracks, and the bonds that cracks break; only with cracks or breaking bonds.
+    /// Bonds of each particle without cracks, and the bonds that cracks break; only with cracks or breaking
+    /// bonds.
     pub whole: Option<[Vec<u32>; 2]>,
     /// Area of new cracks, if bonds break.
     pub cracks: Option<CrackArea>,
@@ -184,8 +185,8 @@ pub struct Physics<const D: usize> {
     pub tearing: Option<f64>,
     /// Exact stresses of the plate of `[exact]`.
     pub plate: Option<Plate>,
-    /// Sites at which stress measures compensate for missing bonds by the window's share in the body: where forces act, or where
-    /// the surface correction already compensates.
+    /// Sites at which stress measures compensate for missing bonds by the window's share in the body: where
+    /// forces act, or where the surface correction already compensates.
     pub by_window: Vec<bool>,
 }
 

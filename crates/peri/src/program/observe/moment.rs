@@ -70,8 +70,8 @@ impl<'a, const D: usize> Moment<'a, D> {
         self.fragments.get_or_init(|| if breaks { fragments(self.bonds) } else { Vec::new() })
     }
 
-    /// Returns the damage of each particle: broken bonds over the bonds of the body without cracks, so that cracks of the scene
-    /// count as damage. `None` without cracks and breaking bonds.
+    /// Returns the damage of each particle: broken bonds over the bonds of the body without cracks, so that
+    /// cracks of the scene count as damage. `None` without cracks and breaking bonds.
     pub fn damage(&self) -> Option<Vec<f64>> {
         let [whole, _] = self.physics.whole.as_ref()?;
         let part = |(&whole, site): (&u32, usize)| match whole {

@@ -16,8 +16,8 @@ pub fn stress_unit(largest: f64) -> (f64, &'static str) {
     units.into_iter().find(|(scale, _)| largest * scale >= 0.1).unwrap_or((1.0, "Pa"))
 }
 
-/// Returns the largest distance, in spacings, of lattice neighbours that pictures draw as connected. By stretch criteria it is
-/// the critical stretch: the longest observed bond may have broken.
+/// Returns the largest distance, in spacings, of lattice neighbours that pictures draw as connected. By
+/// stretch criteria it is the critical stretch: the longest observed bond may have broken.
 pub(super) fn bridge_length<const D: usize>(m: &Moment<D>) -> f64 {
     let most = match &m.physics.body.criterion {
         Some(Criterion::Stretch(stretch)) => stretch.least(),

@@ -16,8 +16,8 @@ use harness::report::Named;
 pub(super) struct Sections<'s>(pub &'s Scene);
 
 impl Sections<'_> {
-    /// Iterates over sections, the first column of each in a row of the history, and their scalars: forces along x, y(, z), then
-    /// moments about z in a plane body, about x, y, z in a solid.
+    /// Iterates over sections, the first column of each in a row of the history, and their scalars: forces
+    /// along x, y(, z), then moments about z in a plane body, about x, y, z in a solid.
     fn each(&self) -> impl Iterator<Item = (&SectionSpec, usize, Vec<Named>)> {
         let solid = self.0.body.space == Space::Solid;
         let (axes, about) = (&["x", "y", "z"][..if solid { 3 } else { 2 }], if solid { 0 } else { 2 });

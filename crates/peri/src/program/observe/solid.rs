@@ -49,8 +49,8 @@ pub fn extend_box(bounds: &mut [[f64; 3]; 2], places: &[[f64; 3]]) {
     }
 }
 
-/// Returns the stress component of the scene from a row-major 3 × 3 tensor; by default the largest principal stress, of a
-/// plane tensor in its plane.
+/// Returns the stress component of the scene from a row-major 3 × 3 tensor; by default the largest principal
+/// stress, of a plane tensor in its plane.
 pub fn shown_stress(spec: &StressSpec, flat: bool, t: &[f64]) -> f64 {
     if let Some([a, b]) = spec.component() {
         return t[3 * a + b];
@@ -67,8 +67,8 @@ pub fn shown_stress(spec: &StressSpec, flat: bool, t: &[f64]) -> f64 {
     (0.5 * (tensor + tensor.transpose())).symmetric_eigenvalues().max()
 }
 
-/// Returns the field of stresses, with a range that leaves out extremes: the Cauchy stress of a crushed particle would use all
-/// colours.
+/// Returns the field of stresses, with a range that leaves out extremes: the Cauchy stress of a crushed
+/// particle would use all colours.
 pub fn stress_field(spec: &StressSpec, mut values: Vec<f64>) -> ColouredField {
     values.retain(|value| !value.is_nan());
     values.sort_by(f64::total_cmp);

@@ -9,8 +9,8 @@ use harness::output::vtkhdf;
 use std::borrow::Cow;
 use std::path::Path;
 
-/// Draws stress and damage at some stages from the last intact state on, of a plane body or of the middle plane y = const of a
-/// solid; a solid also from outside.
+/// Draws stress and damage at some stages from the last intact state on, of a plane body or of the middle
+/// plane y = const of a solid; a solid also from outside.
 ///
 /// # Errors
 /// Files that cannot be read or written.
@@ -130,8 +130,8 @@ impl StageLayout {
     }
 }
 
-/// Chooses the last frame before the first break, the peak if it is later, frames at even fractions of all damage, and the
-/// last frame.
+/// Chooses the last frame before the first break, the peak if it is later, frames at even fractions of all
+/// damage, and the last frame.
 fn choose_frames(damage: &[f64], peak: Option<usize>, count: usize) -> Vec<usize> {
     let last = damage.len() - 1;
     let whole = damage.iter().rposition(|&d| d == 0.0).unwrap_or(0);

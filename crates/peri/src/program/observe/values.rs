@@ -1,4 +1,5 @@
-//! Scalars of every run: stretches, fit error, reactions, the largest displacement, motion, fields of other scenes.
+//! Scalars of every run: stretches, fit error, reactions, the largest displacement, motion, fields of other
+//! scenes.
 
 use super::moment::Moment;
 use crate::bonds::covered_stretches;

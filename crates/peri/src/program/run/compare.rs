@@ -99,7 +99,8 @@ pub fn report(source: &Source, scene: &Scene, outcomes: &[VariantOutcome], quick
     report
 }
 
-/// Adds `same_events[VARIANT]`: the number of first events of a variant with the same bonds and load step as in the reference.
+/// Adds `same_events[VARIANT]`: the number of first events of a variant with the same bonds and load step as
+/// in the reference.
 fn add_same_events(report: &mut Report, compare: &Compare, outcomes: &[VariantOutcome]) {
     let compared = || outcomes.iter().filter(|outcome| outcome.get(&compare.quantity).is_some());
     let truth = compared().find(|o| Some(&o.name) == compare.variant.as_ref());
@@ -237,7 +238,8 @@ pub fn notes(outcomes: &[VariantOutcome]) -> String {
         let step = members.iter().filter_map(|o| o.step_at_peak()).fold(0.0, f64::max);
         let known = if step >= change { ": use smaller steps first" } else { "" };
         lines.push(format!(
-            "{family}: the peak load changes by {:.2} % between the two finest spacings; a load step changes it by up to \
+            "{family}: the peak load changes by {:.2} % between the two finest spacings; a load step changes \
+             it by up to \
              {:.2} %{known}",
             100.0 * change,
             100.0 * step
@@ -246,7 +248,8 @@ pub fn notes(outcomes: &[VariantOutcome]) -> String {
     lines.iter().map(|line| format!("{line}\n")).collect()
 }
 
-/// Writes the table of a suite, also as trials of the report: expected and observed behaviour and cost of each variant.
+/// Writes the table of a suite, also as trials of the report: expected and observed behaviour and cost of
+/// each variant.
 ///
 /// # Errors
 /// A file that cannot be written.

@@ -162,7 +162,8 @@ fn draw_peaks(outcomes: &[VariantOutcome], output: &Path) -> Result<(), Error> {
     if any { plot.write(output.join("peak_load.png")) } else { Ok(()) }
 }
 
-/// Writes the tables of every variant, a plot of all loads, and a plot of energies for each variant with broken bonds.
+/// Writes the tables of every variant, a plot of all loads, and a plot of energies for each variant with
+/// broken bonds.
 pub fn write(scene: &Scene, outcomes: &[VariantOutcome], output: &Path) -> Result<(), Error> {
     let several: Vec<&VariantOutcome> = outcomes.iter().filter(|o| o.history.len() > 1).collect();
     for outcome in &several {

@@ -48,7 +48,8 @@ impl FinishedScene {
         compare::notes(&self.outcomes)
     }
 
-    /// Returns the summary for the terminal: all values of a single variant or a line per variant, then the verdicts.
+    /// Returns the summary for the terminal: all values of a single variant or a line per variant, then the
+    /// verdicts.
     pub fn summary(&self) -> String {
         let notes = self.notes();
         if self.outcomes.len() == 1 {
@@ -282,7 +283,7 @@ fn solve<const D: usize>(
     system.breaking = criterion.map(|criterion| Breaking { criterion, policy: scene.solver.breaking });
     system.contact = contact;
     (system.refine, system.snap_back) = (scene.solver.refine, scene.solver.snap_back);
-    system.stop_below = scene.solver.stop_below.unwrap_or(0.0);
+    system.stop_below = scene.solver.stop_below.map_or(0.0, |part| part.si());
     phases.borrow_mut().start("solve");
     let mut finished = |bonds: &dyn Bonds<D>, state: &State<D>| {
         phases.borrow_mut().stop();

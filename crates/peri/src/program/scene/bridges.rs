@@ -19,7 +19,8 @@ pub(super) fn bridges<const D: usize>(body: &DiscreteBody<D>) -> Vec<String> {
     let each = body.cuts.iter().enumerate().filter_map(|(index, cut)| {
         if let Some((other, gap)) = missed(body, index) {
             return Some(format!(
-                "body.cracks[{index}] misses body.cracks[{other}] by {:.4} mm: bonds pass between them; let them meet within \
+                "body.cracks[{index}] misses body.cracks[{other}] by {:.4} mm: bonds pass between them; let \
+                 them meet within \
                  {:.4} mm, or reach beyond each other",
                 gap * 1e3,
                 MEETING_DISTANCE * spacing * 1e3
@@ -28,7 +29,8 @@ pub(super) fn bridges<const D: usize>(body: &DiscreteBody<D>) -> Vec<String> {
         let bonds = before_an_end(body, cut);
         (bonds > 0).then(|| {
             format!(
-                "body.cracks[{index}] ends less than a spacing ({:.3} mm) before the surface or another crack: {bonds} bonds cross \
+                "body.cracks[{index}] ends less than a spacing ({:.3} mm) before the surface or another \
+                 crack: {bonds} bonds cross \
                  there and bridge it; let it reach beyond",
                 spacing * 1e3
             )
@@ -73,7 +75,8 @@ fn before_an_end<const D: usize>(body: &DiscreteBody<D>, cut: &Cut<D>) -> u64 {
     counts.values().filter(|[_, far]| *far == 0).map(|[near, _]| near).sum()
 }
 
-/// Returns the crack that a front of crack `index` misses by less than half a spacing inside the body, and the distance, m.
+/// Returns the crack that a front of crack `index` misses by less than half a spacing inside the body, and
+/// the distance, m.
 fn missed<const D: usize>(body: &DiscreteBody<D>, index: usize) -> Option<(usize, f64)> {
     let (bonds, spacing) = (&*body.bonds, body.bonds.spacing());
     let inside = |place: &[f64; D]| {

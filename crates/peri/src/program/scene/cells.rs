@@ -33,7 +33,8 @@ impl HexMesh {
     }
 }
 
-/// Field over nodes (trilinear in each cell) or over cells: a scalar, or the six components of a symmetric tensor.
+/// Field over nodes (trilinear in each cell) or over cells: a scalar, or the six components of a symmetric
+/// tensor.
 pub struct MeshField {
     of_cells: bool,
     /// Number of components, 1 or 6.
@@ -67,7 +68,8 @@ impl MeshField {
         [[0, 3, 5], [3, 1, 4], [5, 4, 2]].map(|row| row.map(&component))
     }
 
-    /// Returns the node or the middle of the cell in a box at which the field is not finite, and the value there.
+    /// Returns the node or the middle of the cell in a box at which the field is not finite, and the value
+    /// there.
     pub fn missing(&self, mesh: &HexMesh, overlap: &Overlap, index: usize) -> Option<([f64; 3], f64)> {
         let wrong = |at: u32| self.data.iter().map(|values| values[at as usize]).find(|x| !x.is_finite());
         if self.of_cells {
@@ -85,11 +87,11 @@ impl MeshField {
     /// # Errors
     /// As [`Overlap::from_nodes`].
     pub fn means(&self, overlap: &Overlap) -> Result<Vec<Vec<Option<f64>>>, polycore::Error> {
-        let of = |values: &Vec<f64>| match self.of_cells {
+        let means = |values: &Vec<f64>| match self.of_cells {
             true => overlap.from_cells(values),
             false => overlap.from_nodes(values),
         };
-        self.data.iter().map(of).collect()
+        self.data.iter().map(means).collect()
     }
 
     /// Returns the volume of the mesh where the field is finite, and the integral of [`Self::mean_of`].

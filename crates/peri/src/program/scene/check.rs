@@ -367,5 +367,5 @@ fn solver(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         return Err(source.error("solver.snap_back", found, allowed));
     }
     within("accept", solver.accept.unwrap_or(0.0), 0.0, 1.0)?;
-    within("stop_below", solver.stop_below.unwrap_or(0.0), 0.0, 1.0)
+    within("stop_below", solver.stop_below.map_or(0.0, |part| part.si()), 0.0, 1.0)
 }

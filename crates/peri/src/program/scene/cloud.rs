@@ -151,7 +151,10 @@ fn read<const D: usize>(source: &Source, path: &Path) -> Result<CloudPoints<D>, 
     };
     let names: &[&str] = if D == 2 { &["x", "y", "volume"] } else { &["x", "y", "z", "volume"] };
     let columns = format!("columns {} (m, m³)", names.join(", "));
-    let table = Table::read(path).map_err(|error| bad(format!(": {error}"), &columns))?;
+    let refused = |error: &dyn std::fmt::Display| {
+        source.refused("body.points", format!("{error}; the file needs {columns}"))
+    };
+    let table = Table::read(path).map_err(|error| refused(&error))?;
     let headings: Vec<&str> = table.headings.iter().map(|heading| heading.text.as_str()).collect();
     let found = names.iter().filter_map(|name| table.find(name)).collect::<Vec<usize>>();
     if found.len() != names.len() || headings.len() != names.len() {
@@ -163,7 +166,7 @@ fn read<const D: usize>(source: &Source, path: &Path) -> Result<CloudPoints<D>, 
         _ => table.column::<LengthDimension>(column, Some("m")),
     };
     let values = found.iter().map(in_si).collect::<Result<Vec<_>, _>>();
-    let values = values.map_err(|error| bad(format!(": {error}"), &columns))?;
+    let values = values.map_err(|error| refused(&error))?;
     let (mut positions, mut volumes) = (Vec::new(), Vec::new());
     for row in 0..table.rows() {
         let volume = values[D][row];
@@ -180,8 +183,9 @@ fn read<const D: usize>(source: &Source, path: &Path) -> Result<CloudPoints<D>, 
     Ok((positions, volumes))
 }
 
-/// Refuses a horizon with so many bonds that memory does not suffice. Counts points in cells as wide as the horizon: the
-/// block of 3^D cells around a point contains its ball, and about (block/ball) times as many points.
+/// Refuses a horizon with so many bonds that memory does not suffice. Counts points in cells as wide as the
+/// horizon: the block of 3^D cells around a point contains its ball, and about (block/ball) times as many
+/// points.
 fn refuse_too_many_bonds<const D: usize>(
     source: &Source,
     positions: &[[f64; D]],

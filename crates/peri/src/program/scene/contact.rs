@@ -21,22 +21,22 @@ const ROUGHEST: f64 = 100.0;
 #[derive(Clone, Debug, Default, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ContactSpec {
-    /// Stiffness s: a contact of two bodies is as compliant as 2/s layers of confined material, a contact with a plane
-    /// as 1/s layers; 0 only records overlaps. Default: 2; for planes in equilibrium 10.
+    /// Stiffness s: a contact of two bodies is as compliant as 2/s layers of confined material, a contact
+    /// with a plane as 1/s layers; 0 only records overlaps. Default: 2; for planes in equilibrium 10.
     pub stiffness: Option<f64>,
-    /// Stiffness κ of a contact of particles over that of a bond as long as the horizon, instead of `stiffness`; 15 in
-    /// the literature.
+    /// Stiffness κ of a contact of particles over that of a bond as long as the horizon, instead of
+    /// `stiffness`; 15 in the literature.
     pub short_range: Option<f64>,
     /// Coefficient of Coulomb friction μ between particles, and of planes without `friction`.
     pub friction: f64,
-    /// Elastic slip γ of sticking contacts at the force at which they begin to slide; default: the slip at which
-    /// tangential and normal stiffness are equal.
+    /// Elastic slip γ of sticking contacts at the force at which they begin to slide; default: the slip at
+    /// which tangential and normal stiffness are equal.
     #[serde(alias = "slip_length")]
     pub elastic_slip: Option<Length>,
     /// Ignored; kept for older scenes. Sticking friction holds by its elastic slip.
     pub slip_velocity: Option<Speed>,
-    /// Holds regions of prescribed displacement at the surface of a solid instead of by bonds across it, which are as
-    /// compliant as a layer of the body. Default: true beside planes, unless bonds break.
+    /// Holds regions of prescribed displacement at the surface of a solid instead of by bonds across it,
+    /// which are as compliant as a layer of the body. Default: true beside planes, unless bonds break.
     pub tied_grips: Option<bool>,
     /// Rigid planes.
     pub plane: Vec<PlaneSpec>,

@@ -1,7 +1,7 @@
 //! Cracks of zero width, and the bonds that they sever.
 
 use super::Scene;
-use super::values::vector;
+use super::values::{plain, vector};
 use crate::bonds::{Bonds, CellGrid};
 use crate::geometry::{Cut, cuts_within, severed as severs};
 use harness::scene::{SceneError, Source};
@@ -80,11 +80,12 @@ pub(super) fn severed<const D: usize>(
             }
         }
         if severed == 0 {
-            let found = "a crack that breaks no bond";
+            let spacing = plain((bonds.spacing() * 1e9).round() / 1e6);
+            let found = format!("a crack that breaks no bond of particles {spacing} mm apart");
             return Err(source.error(
                 &format!("body.cracks[{index}]"),
                 found,
-                "a crack across a part of the body",
+                "a crack across a part of the body, or a smaller spacing",
             ));
         }
         Ok(severed)

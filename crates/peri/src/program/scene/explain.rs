@@ -136,7 +136,8 @@ pub fn explain<const D: usize>(
 /// Characters of a line of `check` that lists names.
 const LINE_WIDTH: usize = 100;
 
-/// Returns names separated by commas, in lines of up to [`LINE_WIDTH`] characters; the label stands before the first.
+/// Returns names separated by commas, in lines of up to [`LINE_WIDTH`] characters; the label stands before
+/// the first.
 fn wrapped_list(label: &str, names: &[&str]) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for (index, name) in names.iter().enumerate() {

@@ -1,4 +1,5 @@
-//! Specification of material parameters that follow a field of another scene, such as the crystallinity of a part.
+//! Specification of material parameters that follow a field of another scene, such as the crystallinity of a
+//! part.
 
 use polycore::units::{Length, Time};
 use serde::{Deserialize, Deserializer};
@@ -13,8 +14,8 @@ pub struct FieldSpec {
     pub of: VaryingParameter,
     /// The field.
     pub from: FieldSource,
-    /// Rows [value of the field, value of the parameter]; linear between them, an error outside. Empty for a `prestrain`
-    /// from a stress tensor: the stress while the body is held in its shape.
+    /// Rows [value of the field, value of the parameter]; linear between them, an error outside. Empty for a
+    /// `prestrain` from a stress tensor: the stress while the body is held in its shape.
     #[serde(default)]
     pub table: Vec<[TableEntry; 2]>,
     /// Placement of the body in the mesh of the field; default: equal coordinates.
@@ -122,9 +123,9 @@ impl VaryingParameter {
 /// A number, or a text with a unit.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TableEntry {
-    /// Without a unit.
+    /// Number without unit.
     Number(f64),
-    /// With one.
+    /// Text with a unit.
     Text(String),
 }
 
@@ -157,6 +158,7 @@ impl schemars::JsonSchema for TableEntry {
     }
 
     fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
-        schemars::json_schema!({ "description": "a number, or a text with a unit", "type": ["number", "string"] })
+        schemars::json_schema!({ "description": "a number, or a text with a \
+            unit", "type": ["number", "string"] })
     }
 }

@@ -56,12 +56,12 @@ impl FieldKind {
 
     /// Returns the offset and the factor that convert values of an array to SI units.
     fn scale(self, unit: &str) -> (f64, f64) {
-        let at = |value: f64| self.si(&TableEntry::Text(format!("{value} {unit}"))).unwrap_or(f64::NAN);
+        let si_of = |value: f64| self.si(&TableEntry::Text(format!("{value} {unit}"))).unwrap_or(f64::NAN);
         match self {
             Self::Number => (0.0, 1.0),
             _ => {
                 // offset and factor from two temperatures
-                let (low, high) = (at(100.0), at(200.0));
+                let (low, high) = (si_of(100.0), si_of(200.0));
                 (low - (high - low), 0.01 * (high - low))
             }
         }
@@ -137,8 +137,8 @@ impl fmt::Display for ParameterField {
 /// Computes the parameters of a scene that follow fields.
 ///
 /// # Errors
-/// A file that cannot be read, or without the field, step or unit, or without hexahedra; a table that does not increase, or
-/// that the field leaves; a body outside the mesh, or where the field is not finite.
+/// A file that cannot be read, or without the field, step or unit, or without hexahedra; a table that does
+/// not increase, or that the field leaves; a body outside the mesh, or where the field is not finite.
 pub fn followed<const D: usize>(
     source: &Source,
     scene: &Scene,
@@ -195,8 +195,9 @@ impl FieldSpec {
         let mut stress = vec![[[0.0; 3]; 3]; if values.components == 6 { bonds.sites() } else { 0 }];
         let (mut sum, mut volume) = (0.0, 0.0);
         for index in 0..boxes.len() {
-            let at = |component: usize| zero + scale * means[component][index].unwrap_or(f64::NAN);
-            let value = values.mean_of(at);
+            let component_mean =
+                |component: usize| zero + scale * means[component][index].unwrap_or(f64::NAN);
+            let value = values.mean_of(component_mean);
             let mapped = match values.components {
                 1 => interpolate(&table, value),
                 _ => Some(value),
@@ -210,7 +211,7 @@ impl FieldSpec {
             let site = bonds.particles()[index] as usize;
             parameter[site] = mapped;
             if let Some(tensor) = stress.get_mut(site) {
-                *tensor = self.along_axes(MeshField::tensor(at));
+                *tensor = self.along_axes(MeshField::tensor(component_mean));
             }
             sum += bonds.volume(site) * value;
             volume += bonds.volume(site);
@@ -286,20 +287,28 @@ impl FieldSpec {
     ) -> Result<Vec<(f64, f64)>, SceneError> {
         let mut table: Vec<(f64, f64)> = Vec::new();
         for (row, [from, to]) in self.table.iter().enumerate() {
-            let at = |column: usize| format!("{key}.table[{row}][{column}]");
+            let entry_key = |column: usize| format!("{key}.table[{row}][{column}]");
             let found = match from {
                 TableEntry::Number(number) => plain(*number),
                 TableEntry::Text(text) => format!("`{text}`"),
             };
             let Some(from) = kind.si(from) else {
-                return Err(source.error(&at(0), found, format!("{}: the field is `{array}`", kind.name())));
+                return Err(source.error(
+                    &entry_key(0),
+                    found,
+                    format!("{}: the field is `{array}`", kind.name()),
+                ));
             };
             if table.last().is_some_and(|(before, _)| *before >= from) {
-                return Err(source.error(&at(0), found, "values of the field that increase from row to row"));
+                return Err(source.error(
+                    &entry_key(0),
+                    found,
+                    "values of the field that increase from row to row",
+                ));
             }
-            let to = self.of.si(to).map_err(|reason| source.refused(&at(1), reason))?;
+            let to = self.of.si(to).map_err(|reason| source.refused(&entry_key(1), reason))?;
             if self.of != VaryingParameter::Prestrain {
-                positive(source, &at(1), to, self.of.unit())?;
+                positive(source, &entry_key(1), to, self.of.unit())?;
             }
             table.push((from, to));
         }
@@ -367,7 +376,7 @@ impl FieldSpec {
             }
         }
         let bonds = &*body.bonds;
-        let of = |&site: &u32| {
+        let cuboid = |&site: &u32| {
             let (position, volume) = (bonds.position(site as usize), bonds.volume(site as usize));
             let edge = if D == 3 { volume.cbrt() } else { (volume / body.thickness).sqrt() };
             let mut own = whole;
@@ -377,7 +386,7 @@ impl FieldSpec {
             }
             own
         };
-        Ok(bonds.particles().iter().map(of).collect())
+        Ok(bonds.particles().iter().map(cuboid).collect())
     }
 }
 

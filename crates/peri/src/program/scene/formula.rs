@@ -1,7 +1,7 @@
 //! Formulas of scenes: functions of position (`x`, `y`, `z`, m) or time (`t`, s), in SI units.
 //!
-//! They have sums, products, powers (`^`), brackets, `pi`, and the functions of [`FormulaFunction`]. A formula is evaluated
-//! together with its exact rate, by dual numbers.
+//! They have sums, products, powers (`^`), brackets, `pi`, and the functions of [`FormulaFunction`]. A
+//! formula is evaluated together with its exact rate, by dual numbers.
 
 use serde::Deserialize;
 use std::f64::consts::PI;

@@ -10,8 +10,8 @@ const WARNING_CHANGE: f64 = 1e-3;
 /// A spacing, m, and the free length along each axis with grips at both sides, m.
 type FreeLengths<const D: usize> = (f64, [Option<f64>; D]);
 
-/// Returns a warning for each axis along which the free length between grips differs between variants that differ in
-/// spacing only.
+/// Returns a warning for each axis along which the free length between grips differs between variants that
+/// differ in spacing only.
 ///
 /// # Errors
 /// As [`super::body_of`].
@@ -50,8 +50,10 @@ pub fn free_lengths<const D: usize>(variants: &[SceneVariant]) -> Result<Vec<Str
             if most.1 - least.1 > WARNING_CHANGE * most.1.abs() {
                 let name = ["x", "y", "z"][axis];
                 warnings.push(format!(
-                    "{family}: the free length between {name}- and {name}+ is {:.4} mm at a spacing of {:.4} mm and {:.4} mm at \
-                     {:.4} mm: grips of whole layers change with the spacing; give their `depth`, a multiple of all spacings",
+                    "{family}: the free length between {name}- and {name}+ is {:.4} mm at a spacing of {:.4} \
+                     mm and {:.4} mm at \
+                     {:.4} mm: grips of whole layers change with the spacing; give their `depth`, a multiple \
+                     of all spacings",
                     least.1 * 1e3,
                     least.0 * 1e3,
                     most.1 * 1e3,

@@ -23,8 +23,8 @@ pub struct Inclusion {
     /// Stiffness over that of the rest; default: 1.
     #[serde(default = "default_stiffness")]
     pub stiffness: f64,
-    /// Replaces `material.critical`. A bond that ends in inclusions or passes through them takes the lowest value on its
-    /// way, so that a layer may be thinner than the spacing.
+    /// Replaces `material.critical`. A bond that ends in inclusions or passes through them takes the lowest
+    /// value on its way, so that a layer may be thinner than the spacing.
     pub critical: Option<Critical>,
     /// Strain ε* of the free part, equal in all directions; prestrains of overlapping parts add up.
     pub prestrain: Option<Ratio>,
@@ -44,8 +44,8 @@ fn prestrain_of_stress<const D: usize>(
     let trace: f64 = (0..D).map(|d| stress[d][d]).sum();
     // a strain across the plane that is zero takes ν(1 + ν) of the sum, in its plane
     let across = if space == Space::PlaneStrain { nu * (1.0 + nu) } else { nu };
-    let of = |a: usize, b: usize| across * if a == b { trace } else { 0.0 } - (1.0 + nu) * stress[a][b];
-    array::from_fn(|a| array::from_fn(|b| of(a, b) / youngs_modulus))
+    let strain = |a: usize, b: usize| across * if a == b { trace } else { 0.0 } - (1.0 + nu) * stress[a][b];
+    array::from_fn(|a| array::from_fn(|b| strain(a, b) / youngs_modulus))
 }
 
 /// Material parameters of each particle, from inclusions and fields of other scenes.
@@ -112,7 +112,7 @@ impl<'a, const D: usize> Inclusions<'a, D> {
             }
             each.push((inclusion, shape, members));
         }
-        let at = |site: usize, _| stiffness.get(site).copied().unwrap_or(1.0);
+        let factor = |site: usize, _| stiffness.get(site).copied().unwrap_or(1.0);
         let fracture_energy = following(VaryingParameter::FractureEnergy).cloned();
         let strain = |site: usize| {
             let own: [[f64; D]; D] =
@@ -127,11 +127,12 @@ impl<'a, const D: usize> Inclusions<'a, D> {
         if let Some(found) = along.reduce(f64::min).filter(|&least| least <= -1.0) {
             return Err(source.error("material", format!("a prestrain of {}", plain(found)), "above -1"));
         }
-        Ok(Self { micromodulus: Property::new(bonds, at), fracture_energy, prestrain, each })
+        Ok(Self { micromodulus: Property::new(bonds, factor), fracture_energy, prestrain, each })
     }
 
-    /// Returns the critical stretch of each particle: `rest`, replaced by the stretch of a fracture energy that follows a
-    /// field, or of the last inclusion with `critical`. `resolve` computes it from the criterion and the relative micromodulus.
+    /// Returns the critical stretch of each particle: `rest`, replaced by the stretch of a fracture energy
+    /// that follows a field, or of the last inclusion with `critical`. `resolve` computes it from the
+    /// criterion and the relative micromodulus.
     ///
     /// # Errors
     /// A critical stretch out of its domain.
@@ -187,8 +188,8 @@ impl<'a, const D: usize> Inclusions<'a, D> {
         Ok(property.weakened(weak.into_iter().map(|(_, bond, value)| (bond, value)).collect()))
     }
 
-    /// Finds bonds that pass through inclusions with a critical stretch, and the lowest critical stretch between their
-    /// ends.
+    /// Finds bonds that pass through inclusions with a critical stretch, and the lowest critical stretch
+    /// between their ends.
     fn weakened_bonds(
         &self,
         source: &Source,
@@ -282,7 +283,8 @@ impl Material {
 mod tests {
     use super::*;
 
-    /// Hooke's law: ε_xx = σ/E and ε_yy = −νσ/E of a bar, with 1 − ν² and −ν(1 + ν) in plane strain; shear σ_xy(1 + ν)/E.
+    /// Hooke's law: ε_xx = σ/E and ε_yy = −νσ/E of a bar, with 1 − ν² and −ν(1 + ν) in plane strain; shear
+    /// σ_xy(1 + ν)/E.
     #[test]
     fn strains_of_stresses() {
         let bar = [[2.0, 0.0, 0.0], [0.0; 3], [0.0; 3]];

@@ -62,8 +62,9 @@ pub fn loads_of<const D: usize>(
     Ok((loads, loaded))
 }
 
-/// Adds a traction on a side of a solid: t (n·h_I)/V_I with area vectors h, which balances a uniform stress in every
-/// particle ([`surface_load`]). It acts within two horizons of the side, in a thin body in the half next to it.
+/// Adds a traction on a side of a solid: t (n·h_I)/V_I with area vectors h, which balances a uniform stress
+/// in every particle ([`surface_load`]). It acts within two horizons of the side, in a thin body in the half
+/// next to it.
 fn add_traction<const D: usize>(
     body: &DiscreteBody<D>,
     side: Side,
@@ -375,7 +376,8 @@ fn support<const D: usize>(
     {
         return Err(source.missing(
             &format!("{key}.displacement"),
-            "needed for a boundary: `displacement`, `rotation`, `traction`, `force` or, in explicit dynamics, \
+            "needed for a boundary: `displacement`, `rotation`, `traction`, `force` or, in explicit \
+             dynamics, \
              `velocity`",
         ));
     }

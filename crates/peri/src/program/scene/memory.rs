@@ -1,7 +1,7 @@
 //! Estimates the memory of a variant before it is solved and, for a lattice, before it is built.
 //!
-//! The sum counts arrays that live at the same time, in bytes per site or particle; the test `memory` of the workspace
-//! compares it with whole runs.
+//! The sum counts arrays that live at the same time, in bytes per site or particle; the test `memory` of the
+//! workspace compares it with whole runs.
 
 use super::{Scene, SolverMethod};
 use crate::bonds::{Bonds, Stencil, storage};
@@ -13,10 +13,11 @@ use polycore::memory::{available, gib};
 
 /// Bytes of threads, the fitted law and tables.
 const ALWAYS: f64 = 20e6;
-/// Vector fields of any method: displacement, velocity, force, loads, sums of a pass, and a checkpoint with copies of the
-/// first three in a growing list.
+/// Vector fields of any method: displacement, velocity, force, loads, sums of a pass, and a checkpoint with
+/// copies of the first three in a growing list.
 const FIELDS: f64 = 10.0;
-/// Vector fields of earlier equilibria, from which the next is predicted, with copies in a checkpoint, and of springs.
+/// Vector fields of earlier equilibria, from which the next is predicted, with copies in a checkpoint, and of
+/// springs.
 const PAST: f64 = 6.0;
 /// Vector fields of L-BFGS beside its pairs.
 const FIELDS_OF_LBFGS: f64 = 8.0;
@@ -140,13 +141,15 @@ pub(super) fn bytes_of_cloud<const D: usize>(particles: f64, bonds: f64) -> f64 
         + padded * (4.0 + 8.0 + 8.0 + BOND_LISTS)
 }
 
-/// Returns the bytes of the short bonds that give the crack area of a cloud, in a growing list, and of their sums.
+/// Returns the bytes of the short bonds that give the crack area of a cloud, in a growing list, and of their
+/// sums.
 fn bytes_of_pairs<const D: usize>(scene: &Scene, particles: f64) -> f64 {
     let pairs = if D == 2 { 4.0 } else { 13.0 };
     if scene.material.critical.is_some() { particles * pairs * (16.0 + 8.0) } else { 0.0 }
 }
 
-/// Returns the additional bytes of a solid in a cloud: θ, its part of the states, and the kernels' data of particles.
+/// Returns the additional bytes of a solid in a cloud: θ, its part of the states, and the kernels' data of
+/// particles.
 fn bytes_of_relief<const D: usize>(scene: &Scene, particles: f64) -> f64 {
     if scene.material.solid.is_none() {
         return 0.0;

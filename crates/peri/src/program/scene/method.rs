@@ -5,7 +5,7 @@ use super::formula::Formula;
 use crate::solver::{
     DynamicRelaxation, Equilibrium, Lbfgs, LbfgsSolver, Policy, RelaxationSolver, VelocityVerlet,
 };
-use polycore::units::{Density, Rate, Time};
+use polycore::units::{Density, Rate, Ratio, Time};
 use serde::Deserialize;
 
 /// Solver settings.
@@ -22,7 +22,8 @@ pub struct SolverSpec {
     pub path: Option<Vec<f64>>,
     /// Largest number of iterations of a step.
     pub max_iterations: u64,
-    /// Largest relative error of the fitted bond law; default 1e-9, or 1e-6 where bonds break or forces are in mixed precision.
+    /// Largest relative error of the fitted bond law; default 1e-9, or 1e-6 where bonds break or forces are
+    /// in mixed precision.
     pub fit_bound: Option<f64>,
     /// Factor on the fictitious mass of dynamic relaxation; default by law.
     pub mass_safety: Option<f64>,
@@ -35,7 +36,7 @@ pub struct SolverSpec {
     /// Times at which bonds are tested for breaking.
     pub breaking: Policy,
     /// Ends the run once the load has fallen below this fraction of its peak.
-    pub stop_below: Option<f64>,
+    pub stop_below: Option<Ratio>,
 }
 
 impl Default for SolverSpec {
@@ -97,8 +98,8 @@ impl SolverMethod {
 }
 
 impl Scene {
-    /// Returns the method; default: L-BFGS, with contact dynamic relaxation, because the coarse level of L-BFGS does not
-    /// include contact.
+    /// Returns the method; default: L-BFGS, with contact dynamic relaxation, because the coarse level of
+    /// L-BFGS does not include contact.
     pub fn method(&self) -> SolverMethod {
         self.solver.method.unwrap_or(if self.contact.is_some() {
             SolverMethod::Adr
@@ -107,8 +108,8 @@ impl Scene {
         })
     }
 
-    /// Returns the tolerance; default: 1e-3; with breaking bonds 1e-4 of L-BFGS and 1e-5 of relaxation, with which the bonds
-    /// break as in exact equilibrium (`cases/ch2/dent-events`).
+    /// Returns the tolerance; default: 1e-3; with breaking bonds 1e-4 of L-BFGS and 1e-5 of relaxation, with
+    /// which the bonds break as in exact equilibrium (`cases/ch2/dent-events`).
     pub fn tolerance(&self) -> f64 {
         let plain = match (self.material.critical.is_some(), self.method()) {
             (false, _) => 1e-3,
@@ -169,8 +170,9 @@ pub enum ForcePrecision {
     /// Double precision.
     #[default]
     Double,
-    /// Single precision for bonds, double precision for the sums of their forces; the report has the error, `mixed_error`.
-    /// Double precision while stretches are so extreme that single precision would miss the law by more than 1e-5.
+    /// Single precision for bonds, double precision for the sums of their forces; the report has the error,
+    /// `mixed_error`. Double precision while stretches are so extreme that single precision would miss the
+    /// law by more than 1e-5.
     Mixed,
 }
 
@@ -185,6 +187,21 @@ impl Dynamics {
             ramp: self.ramp.map_or(0.0, |t| t.si()),
             records: self.records.unwrap_or(plain.records),
             ..plain
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use harness::scene::Source;
+
+    #[test]
+    fn fractions_may_be_percentages() {
+        for text in ["0.02", "\"2 %\""] {
+            let source = Source::new("scene.toml", format!("version = 1\nstop_below = {text}"));
+            let solver = source.parse::<SolverSpec>().unwrap();
+            assert_eq!(solver.stop_below.map(|part| part.si()), Some(0.02));
         }
     }
 }

@@ -71,7 +71,7 @@ use std::path::PathBuf;
 pub struct Scene {
     /// The program that runs it: `peri`.
     pub program: Program,
-    /// One line for tables and pictures.
+    /// Title for tables and pictures.
     #[serde(default)]
     pub title: String,
     /// Geometry and discretisation.
@@ -116,7 +116,7 @@ pub struct Scene {
 #[derive(Clone, Copy, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Program {
-    /// This crate.
+    /// Program of this crate.
     Peri,
 }
 
@@ -140,8 +140,8 @@ pub struct BodySpec {
     pub points: Option<PathBuf>,
     /// A box of cells that may have unequal sides, with `horizon`.
     pub grid: Option<GridSpec>,
-    /// Bonds across gaps: between parts that do not touch and across cuts narrower than the horizon. Default: false; for points
-    /// without a lattice: true.
+    /// Bonds across gaps: between parts that do not touch and across cuts narrower than the horizon. Default:
+    /// false; for points without a lattice: true.
     pub bond_gaps: Option<bool>,
     /// Cracks of zero width.
     #[serde(default)]
@@ -235,8 +235,8 @@ pub enum AxisName {
     Z,
 }
 
-/// Crack of zero width: the segment `from`–`to` in 2D; in 3D a parallelogram with the corner `from` and its neighbours `to`
-/// and `and`.
+/// Crack of zero width: the segment `from`–`to` in 2D; in 3D a parallelogram with the corner `from` and its
+/// neighbours `to` and `and`.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CrackSpec {
@@ -303,7 +303,8 @@ pub struct StressSpec {
     /// Volume of the averaging ball of `ball-share`.
     #[serde(default)]
     pub ball: BallVolume,
-    /// Stress component in pictures of stages, e.g. `22`; default: the largest principal stress, in a plane body in its plane.
+    /// Stress component in pictures of stages, e.g. `22`; default: the largest principal stress, in a plane
+    /// body in its plane.
     pub component: Option<String>,
 }
 
@@ -330,8 +331,8 @@ pub enum ExactSpec {
         /// Remote stress.
         remote_stress: Stress,
     },
-    /// Circular hole in the body's own rectangle, by [`crate::exact::Plate`]: free hole, tractions `remote_stress` in the layers
-    /// of the sides x+ and x−.
+    /// Circular hole in the body's own rectangle, by [`crate::exact::Plate`]: free hole, tractions
+    /// `remote_stress` in the layers of the sides x+ and x−.
     PlateWithHole {
         /// Radius of the hole.
         radius: Length,
@@ -374,7 +375,8 @@ pub struct OutputFiles {
     pub pictures: bool,
     /// Fields as VTKHDF.
     pub fields: bool,
-    /// Interval of steps at which fields are written, also in every step in which bonds break; default: only the end.
+    /// Interval of steps at which fields are written, also in every step in which bonds break; default: only
+    /// the end.
     pub every: Option<usize>,
     /// Number of stages in pictures, from the last intact state to the end; needs `every`.
     pub stages: usize,

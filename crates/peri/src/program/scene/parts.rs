@@ -30,7 +30,8 @@ pub(super) fn bonded_parts<const D: usize>(scene: &Scene, body: &DiscreteBody<D>
     }
     (across > 0).then(|| {
         format!(
-            "the points form parts more than 1.5 edges of their cubes apart, joined by {across} bonds: `body.bond_gaps = false` \
+            "the points form parts more than 1.5 edges of their cubes apart, joined by {across} bonds: \
+             `body.bond_gaps = false` \
              separates them, `true` keeps the bonds"
         )
     })
@@ -64,8 +65,8 @@ pub(super) fn explain<const D: usize>(body: &DiscreteBody<D>) -> Vec<String> {
     for (number, (particles, of)) in parts.values().enumerate().take(LISTED) {
         let shapes: Vec<String> =
             (0..of.len()).filter(|&index| of[index]).map(|index| format!("shapes[{index}]")).collect();
-        let of = if shapes.is_empty() { String::new() } else { format!(" of {}", shapes.join(", ")) };
-        lines.push(format!("  part {:<5} {particles} particles{of}", number + 1));
+        let names = if shapes.is_empty() { String::new() } else { format!(" of {}", shapes.join(", ")) };
+        lines.push(format!("  part {:<5} {particles} particles{names}", number + 1));
     }
     if parts.len() > LISTED {
         lines.push(format!("  parts      {} more", parts.len() - LISTED));

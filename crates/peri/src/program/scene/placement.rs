@@ -36,7 +36,8 @@ pub fn check_placement<const D: usize>(
     }
 }
 
-/// Returns half the edges of the plate of `[exact]` and the width of its loaded layers, m; `None` for other problems.
+/// Returns half the edges of the plate of `[exact]` and the width of its loaded layers, m; `None` for other
+/// problems.
 fn plate_frame<const D: usize>(
     source: &Source,
     scene: &Scene,

@@ -130,7 +130,8 @@ pub(super) fn check<const D: usize>(
                         format!("load factor {factor:.3}")
                     };
                     let found = format!(
-                        "planes `{}` and `{}` {:.3e} m apart at {when}, with {body_between:.3e} m of the body between them",
+                        "planes `{}` and `{}` {:.3e} m apart at {when}, with {body_between:.3e} m of the \
+                         body between them",
                         own.name, other.name, gap
                     );
                     let allowed =
@@ -143,7 +144,7 @@ pub(super) fn check<const D: usize>(
     }
     if let Some((factor, time)) = moments(scene).into_iter().find(|&(f, t)| !has_room(&planes, body, f, t)) {
         let when = if time > 0.0 { format!("time {time:.3e} s") } else { format!("load factor {factor:.3}") };
-        let names: Vec<String> = planes.iter().map(|plane| format!("`{}`", seen.name)).collect();
+        let names: Vec<String> = planes.iter().map(|position| format!("`{}`", position.name)).collect();
         let found = format!("planes {} that leave no room between them at {when}", names.join(", "));
         return Err(source.error(
             "contact.plane",
@@ -154,8 +155,8 @@ pub(super) fn check<const D: usize>(
     Ok(())
 }
 
-/// Returns true if some point near the body is in front of all planes: the largest t with n_i·x − h_i ≥ t is positive. The
-/// maximum is at a corner, where D + 1 of the constraints hold with equality.
+/// Returns true if some point near the body is in front of all planes: the largest t with n_i·x − h_i ≥ t is
+/// positive. The maximum is at a corner, where D + 1 of the constraints hold with equality.
 fn has_room<const D: usize>(
     planes: &[PlanePosition<D>],
     body: &DiscreteBody<D>,
@@ -166,9 +167,9 @@ fn has_room<const D: usize>(
     let size = (0..D).map(|d| high[d] - low[d]).fold(0.0, f64::max);
     // n·x − t ≥ h of planes and of a box ten times the body
     let mut rows: Vec<([f64; D], f64)> = Vec::new();
-    for seen in planes {
-        let at: f64 = (0..D).map(|d| seen.plane.normal[d] * seen.plane.point[d]).sum();
-        rows.push((seen.plane.normal, at + seen.displacement(factor, time)));
+    for position in planes {
+        let at: f64 = (0..D).map(|d| position.plane.normal[d] * position.plane.point[d]).sum();
+        rows.push((position.plane.normal, at + position.displacement(factor, time)));
     }
     if rows.len() < 2 {
         return true;
@@ -212,20 +213,25 @@ pub(super) fn warnings<const D: usize>(
     body: &DiscreteBody<D>,
 ) -> Vec<String> {
     let (planes, spacing) = (plane_positions(source, scene, body).unwrap_or_default(), body.bonds.spacing());
-    let of = |plane: &PlanePosition<D>| {
-        let gap = seen.surface;
+    let warning = |position: &PlanePosition<D>| {
+        let gap = position.surface;
         if gap < -PRESTRESSED * spacing {
             return Some(format!(
-                "plane `{}` stands {:.3e} m inside the surface of the body at the start: it presses before it moves",
-                seen.name, -gap
+                "plane `{}` stands {:.3e} m inside the surface of the body at the start: it presses before \
+                 it moves",
+                position.name, -gap
             ));
         }
-        let moves = seen.plane.displacement != [0.0; D] || seen.plane.velocity != [0.0; D];
-        let reach = moments(scene).into_iter().map(|(f, t)| seen.displacement(f, t)).fold(0.0, f64::max);
-        let far = reach < gap - PRESTRESSED * spacing && !seen.plane.bonded;
+        let moves = position.plane.displacement != [0.0; D] || position.plane.velocity != [0.0; D];
+        let reach = moments(scene).into_iter().map(|(f, t)| position.displacement(f, t)).fold(0.0, f64::max);
+        let far = reach < gap - PRESTRESSED * spacing && !position.plane.bonded;
         (moves && far && scene.dynamics.is_none()).then(|| {
-            format!("plane `{}` comes {reach:.3e} m nearer to the body, whose gap is {gap:.3e} m: it does not reach it", seen.name)
+            format!(
+                "plane `{}` comes {reach:.3e} m nearer to the body, whose gap is {gap:.3e} m: it does \
+                not reach it",
+                position.name
+            )
         })
     };
-    planes.iter().filter_map(of).collect()
+    planes.iter().filter_map(warning).collect()
 }

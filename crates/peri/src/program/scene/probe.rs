@@ -1,5 +1,5 @@
-//! Probes of a scene, recorded in every row of the history: displacements, strains between marks, rotations, crack tips,
-//! wave fronts, J-integrals.
+//! Probes of a scene, recorded in every row of the history: displacements, strains between marks, rotations,
+//! crack tips, wave fronts, J-integrals.
 
 use super::region::region;
 use super::values::{DiscreteBody, vector};

@@ -9,7 +9,8 @@ use crate::solver::{Loads, RotatingRegion, Rotation, Support};
 use harness::scene::{SceneError, Source};
 use nalgebra::{DMatrix, SMatrix};
 
-/// Rotation of a `displacement_field`, °, above which `check` proposes `rotation`: at half of it the chord is 0.4 % off.
+/// Rotation of a `displacement_field`, °, above which `check` proposes `rotation`: at half of it the chord is
+/// 0.4 % off.
 const LARGE_ROTATION: f64 = 10.0;
 /// Largest strain of a field that rotates its region as a rigid body.
 const RIGID_STRAIN: f64 = 0.02;
@@ -17,7 +18,8 @@ const RIGID_STRAIN: f64 = 0.02;
 /// Converts the rotation of a boundary.
 ///
 /// # Errors
-/// An invalid point, axis or angle; a free component that the rotation needs; a `displacement_field` beside it.
+/// An invalid point, axis or angle; a free component that the rotation needs; a `displacement_field` beside
+/// it.
 pub(super) fn rotation_of<const D: usize>(
     source: &Source,
     key: &str,
@@ -102,21 +104,22 @@ pub(super) fn turn<const D: usize>(
 
 /// Warnings of fields of displacements that turn a region: they grow along the chord.
 pub(super) fn chords<const D: usize>(source: &Source, scene: &Scene, body: &DiscreteBody<D>) -> Vec<String> {
-    let of = |(index, boundary): (usize, &Boundary)| {
+    let warning = |(index, boundary): (usize, &Boundary)| {
         let field = boundary.displacement_field.as_ref()?;
         let key = format!("boundary[{index}]");
         let (members, _) = region(source, &key, boundary, body).ok()?;
         let angle = angle_of(&*body.bonds, &members, field)?.to_degrees();
         (angle > LARGE_ROTATION).then(|| {
             format!(
-                "{key}.displacement_field turns its region by {}°, along the chord: at half the load it is narrower by a factor of \
+                "{key}.displacement_field turns its region by {}°, along the chord: at half the load it is \
+                 narrower by a factor of \
                  {:.4}; `rotation` turns it along the arc",
                 plain((angle * 10.0).round() / 10.0),
                 (0.5 * angle.to_radians()).cos()
             )
         })
     };
-    scene.boundary.iter().enumerate().filter_map(of).collect()
+    scene.boundary.iter().enumerate().filter_map(warning).collect()
 }
 
 /// Returns the angle of a field that rotates its region nearly rigidly, rad, from the closest affine field.

@@ -26,8 +26,9 @@ pub struct SolidLaw {
     pub bulk_modulus: Option<Stress>,
     /// Links of a chain, of `eight-chain`.
     pub links: Option<f64>,
-    /// Averages J of the volumetric energy over nearest neighbours, for `eight-chain` on a lattice, solid or plane strain.
-    /// Default: true beside rigid planes if the bulk modulus is at least 50 times the shear modulus.
+    /// Averages J of the volumetric energy over nearest neighbours, for `eight-chain` on a lattice, solid or
+    /// plane strain. Default: true beside rigid planes if the bulk modulus is at least 50 times the shear
+    /// modulus.
     pub pressure_filter: Option<bool>,
     /// Constitutive law of `correspondence`.
     pub constitutive: Option<ConstitutiveSpec>,
@@ -55,8 +56,9 @@ impl SolidKind {
     }
 }
 
-/// Bulk modulus over shear modulus above which the pressure is filtered beside planes, where coarse lattices are too stiff
-/// otherwise (docs/guide/src/how-to/contact.md). Without planes the compliance of grips held by bonds compensates for that.
+/// Bulk modulus over shear modulus above which the pressure is filtered beside planes, where coarse lattices
+/// are too stiff otherwise (docs/guide/src/how-to/contact.md). Without planes the compliance of grips held by
+/// bonds compensates for that.
 const FILTERED_RATIO: f64 = 50.0;
 
 /// Key of the block.

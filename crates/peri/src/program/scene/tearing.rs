@@ -63,11 +63,13 @@ pub fn explain_tearing<const D: usize>(
             onset(own.stretch)
         ),
         Convention::Tearing => format!(
-            "λc = {:.6}: {tearing} J/m² by `tearing`, {bonds} J/m² by `bonds`; c = {c:.4} (κ = {loss:.4} of {count:.1} bonds)",
+            "λc = {:.6}: {tearing} J/m² by `tearing`, {bonds} J/m² by `bonds`; c = {c:.4} (κ = {loss:.4} of \
+             {count:.1} bonds)",
             own.stretch
         ),
         Convention::Bonds => format!(
-            "λc = {:.6}: {bonds} J/m² by `bonds`, {tearing} J/m² by `tearing`; c = {c:.4} (κ = {loss:.4} of {count:.1} bonds)",
+            "λc = {:.6}: {bonds} J/m² by `bonds`, {tearing} J/m² by `tearing`; c = {c:.4} (κ = {loss:.4} of \
+             {count:.1} bonds)",
             own.stretch
         ),
     };
@@ -90,7 +92,8 @@ fn digits(value: f64) -> String {
     )
 }
 
-/// Warns where a crack runs at an energy other than the fracture energy by `tearing`; numbers from the theory page of tearing.
+/// Warns where a crack runs at an energy other than the fracture energy by `tearing`; numbers from the theory
+/// page of tearing.
 pub fn tearing_warnings<const D: usize>(
     scene: &Scene,
     body: &DiscreteBody<D>,
@@ -103,20 +106,23 @@ pub fn tearing_warnings<const D: usize>(
     let ratio = bonds.horizon() / bonds.spacing();
     let whole = (!own.crossing.whole).then(|| {
         format!(
-            "no particle has a whole family: the fracture energy is that of the largest, of {:.0} bonds; take a finer spacing",
+            "no particle has a whole family: the fracture energy is that of the largest, of {:.0} bonds; \
+             take a finer spacing",
             own.crossing.bonds
         )
     });
     let narrow = (ratio < LEAST_RATIO).then(|| {
         format!(
-            "a horizon of {ratio:.3} spacings: cracks keep to the axes of the lattice, others take more than twice the fracture \
+            "a horizon of {ratio:.3} spacings: cracks keep to the axes of the lattice, others take more than \
+             twice the fracture \
              energy; take a ratio of 3.015"
         )
     });
     let scatter = if scene.body.has_points() { scatter(bonds) } else { 0.0 };
     let uneven = (scatter > UNEVEN && !soft).then(|| {
         format!(
-            "points lie unevenly (nearest distances scatter by {:.0} %): cracks run at the fracture energy to 15 %, on a regular \
+            "points lie unevenly (nearest distances scatter by {:.0} %): cracks run at the fracture energy \
+             to 15 %, on a regular \
              lattice to 5 %",
             100.0 * scatter
         )
@@ -132,7 +138,8 @@ pub fn tearing_warnings<const D: usize>(
         let length = length_inside(cut, body.bounds)?;
         (length < least * (1.0 - 1e-9)).then(|| {
             format!(
-                "body.cracks[{index}] is {:.1} spacings long: its tip advances before it runs, so that the load comes out low; 3 % \
+                "body.cracks[{index}] is {:.1} spacings long: its tip advances before it runs, so that the \
+                 load comes out low; 3 % \
                  need {} spacings at a horizon of {ratio:.3}",
                 length / bonds.spacing(),
                 LONG_CRACK[usize::from(ratio >= WIDE_RATIO)]
@@ -150,7 +157,8 @@ fn slab<const D: usize>(scene: &Scene, body: &DiscreteBody<D>) -> Option<String>
     let layers = (high[across] - low[across]) / body.bonds.spacing();
     (scene.body.space == Space::Solid && layers < LAYERS).then(|| {
         format!(
-            "the body is {layers:.1} layers thick along {}: bonds that its faces lack make cracks run at less than the fracture energy, by \
+            "the body is {layers:.1} layers thick along {}: bonds that its faces lack make cracks run at \
+             less than the fracture energy, by \
              about a tenth at 10 layers and a fifth at 6",
             ["x", "y", "z"][across]
         )
@@ -174,8 +182,8 @@ fn scatter<const D: usize>(bonds: &dyn Bonds<D>) -> f64 {
     square.sqrt() / mean
 }
 
-/// Returns the length, m, of a crack in a box: with two tips half of it, in a solid that of its shorter edge; `None` without
-/// a tip inside.
+/// Returns the length, m, of a crack in a box: with two tips half of it, in a solid that of its shorter edge;
+/// `None` without a tip inside.
 fn length_inside<const D: usize>(cut: &Cut<D>, (low, high): ([f64; D], [f64; D])) -> Option<f64> {
     let edges = cut.edges[..D - 1].iter();
     let lengths = edges.filter_map(|edge| {
@@ -206,10 +214,10 @@ mod tests {
     #[test]
     fn lengths_of_cracks() {
         let bounds = ([0.0, 0.0], [10.0, 6.0]);
-        let of = |from, to| length_inside(&Cut::<2>::segment(from, to), bounds);
-        assert_eq!(of([-1.0, 3.0], [4.0, 3.0]), Some(4.0));
-        assert_eq!(of([3.0, 3.0], [7.0, 3.0]), Some(2.0));
-        assert_eq!(of([-1.0, 3.0], [11.0, 3.0]), None);
+        let length = |from, to| length_inside(&Cut::<2>::segment(from, to), bounds);
+        assert_eq!(length([-1.0, 3.0], [4.0, 3.0]), Some(4.0));
+        assert_eq!(length([3.0, 3.0], [7.0, 3.0]), Some(2.0));
+        assert_eq!(length([-1.0, 3.0], [11.0, 3.0]), None);
         let through =
             Cut::<3> { corner: [-1.0, 3.0, -1.0], edges: [[5.0, 0.0, 0.0], [0.0, 0.0, 4.0], [0.0; 3]] };
         assert_eq!(length_inside(&through, ([0.0; 3], [10.0, 6.0, 2.0])), Some(4.0));

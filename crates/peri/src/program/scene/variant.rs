@@ -7,8 +7,8 @@ use harness::study::{self, Naming};
 use polycore::units::Length;
 
 harness::study! {
-    /// Set of variants: all combinations of the listed values. Other keys keep the value of the scene; a replaced block is
-    /// replaced as a whole.
+    /// Set of variants: all combinations of the listed values. Other keys keep the value of the scene; a
+    /// replaced block is replaced as a whole.
     pub struct Study;
     replaces {
         critical: crate::critical::Critical = "material.critical",
@@ -61,7 +61,8 @@ impl SceneVariant {
         })
     }
 
-    /// Returns the short name for tables, curves and expectations: `dx=4mm m=3.015`, corrections, the name of the study.
+    /// Returns the short name for tables, curves and expectations: `dx=4mm m=3.015`, corrections, the name of
+    /// the study.
     pub fn name(&self) -> String {
         self.of.name.clone()
     }

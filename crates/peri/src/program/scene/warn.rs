@@ -70,7 +70,8 @@ fn volumes<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>, thickness: f64) 
     let side = (volume / thickness).sqrt();
     (!(1.0 / UNEVEN..=UNEVEN).contains(&(side / distance))).then(|| {
         format!(
-            "a volume of {volume:.3e} m³ and a thickness of {thickness:.3e} m belong to points {side:.3e} m apart, but they are \
+            "a volume of {volume:.3e} m³ and a thickness of {thickness:.3e} m belong to points {side:.3e} m \
+             apart, but they are \
              {distance:.3e} m apart: do the volumes (in m³) include the thickness?"
         )
     })
@@ -97,7 +98,8 @@ fn thin<const D: usize>(bonds: &dyn Bonds<D>) -> Option<String> {
     // a body that is one particle thick everywhere is intended
     (count > 0 && 2 * count < bonds.particles().len()).then(|| {
         format!(
-            "{count} particles have no neighbour one spacing ({spacing:.3e} m) away along some axis: a part of the body is one \
+            "{count} particles have no neighbour one spacing ({spacing:.3e} m) away along some axis: a part \
+             of the body is one \
              particle wide, whatever width its shape has"
         )
     })
@@ -120,7 +122,8 @@ fn on_crack<const D: usize>(bonds: &dyn Bonds<D>, index: usize, cut: &Cut<D>) ->
     }
     let place = first.map(|x| format!("{:.3}", x * 1e3)).join(", ");
     Some(format!(
-        "{} particles lie on body.cracks[{index}], the first at ({place}) mm, and keep their {kept} bonds to both of its sides: \
+        "{} particles lie on body.cracks[{index}], the first at ({place}) mm, and keep their {kept} bonds to \
+         both of its sides: \
          the crack is bridged; move it by half a spacing ({:.3} mm)",
         on.len(),
         0.5e3 * spacing
@@ -159,7 +162,8 @@ fn bridged<const D: usize>(
     }
     (across > 0).then(|| {
         format!(
-            "body.shapes[{index}] cuts out {:.3} mm along {}, less than the horizon of {:.3} mm: {across} bonds cross it, \
+            "body.shapes[{index}] cuts out {:.3} mm along {}, less than the horizon of {:.3} mm: {across} \
+             bonds cross it, \
              as `bond_gaps` asks",
             width * 1e3,
             ["x", "y", "z"][axis],
@@ -182,7 +186,8 @@ fn long_steps<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> Option<Str
     let horizons = step / bonds.horizon();
     (horizons > LONGEST_STEP).then(|| {
         format!(
-            "a step moves a grip by {:.3} mm, {horizons:.0} horizons: breaking within the step is not resolved; `solver.steps` = {:.0} moves it \
+            "a step moves a grip by {:.3} mm, {horizons:.0} horizons: breaking within the step is not \
+             resolved; `solver.steps` = {:.0} moves it \
              by one spacing",
             step * 1e3,
             largest / bonds.spacing()
