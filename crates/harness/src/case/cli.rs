@@ -255,7 +255,7 @@ fn finish<C: Case>(
     if verbose {
         terminal::print(format_args!("{}results in {}\n", finished.text, output.display()));
     } else {
-        let style = terminal::Style::of_output();
+        let style = terminal::TerminalStyle::of_output();
         terminal::print(summary(&C::PROGRAM, source, &finished, output, begun.elapsed(), &style));
     }
     Ok(finished.report.passed())

@@ -24,16 +24,16 @@ const PATIENCE: Duration = Duration::from_secs(20);
 pub(super) struct InputArguments {
     /// Folder of the results of an input, where it is not beside this run's own; may be repeated.
     #[arg(long = "input", value_name = "NAME=FOLDER")]
-    inputs: Vec<Placed>,
+    inputs: Vec<PlacedInput>,
 }
 
 #[derive(Clone, Debug)]
-struct Placed {
+struct PlacedInput {
     name: String,
     output: PathBuf,
 }
 
-impl FromStr for Placed {
+impl FromStr for PlacedInput {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {

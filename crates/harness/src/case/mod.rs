@@ -16,7 +16,7 @@ pub mod terminal;
 pub use cli::{RunArguments, main, solve};
 pub use folder::{RunLock, lock_run, prepare_run, remove_unfinished, resume_run, share_run};
 pub use inputs::{Input, InputState, attached, input_state, inputs};
-pub(crate) use rows::fits;
+pub(crate) use rows::matches_pattern;
 pub(crate) use rows::natural;
 pub use rows::{Row, Rows, STATISTICS};
 pub(crate) use summary::{Names, main_names};
@@ -97,7 +97,7 @@ pub fn check_expectations(
 ) -> Result<(), SceneError> {
     let known: Vec<&str> = declared.iter().flat_map(|list| *list).map(|quantity| quantity.name).collect();
     check_quantities(source, expectations, &known, |name| {
-        declared.iter().flat_map(|list| *list).any(|quantity| fits(&quantity.pattern(), name))
+        declared.iter().flat_map(|list| *list).any(|quantity| matches_pattern(&quantity.pattern(), name))
     })
 }
 
@@ -242,12 +242,12 @@ pub struct Run<'a> {
     saved: Instant,
     asked: Option<Instant>,
     pub(crate) stopped: bool,
-    kept: Option<Kept<'a>>,
+    kept: Option<VariantCheckpoint<'a>>,
 }
 
 /// Part of a variant in the checkpoint of the whole run.
 #[derive(Clone)]
-pub(crate) struct Kept<'a> {
+pub(crate) struct VariantCheckpoint<'a> {
     /// Stores the state of the variant.
     pub keep: &'a (dyn Fn(Vec<u8>) -> Result<(), Error> + Sync),
     /// State from the checkpoint, if the whole run is resumed.
@@ -272,7 +272,7 @@ impl<'a> Run<'a> {
     }
 
     /// A run of one variant, into the checkpoint of this one.
-    pub(crate) fn of_variant<'b>(&self, options: Options<'b>, kept: Kept<'b>) -> Run<'b> {
+    pub(crate) fn of_variant<'b>(&self, options: Options<'b>, kept: VariantCheckpoint<'b>) -> Run<'b> {
         Run { kept: Some(kept), ..Run::new(self.program, &self.source, options) }
     }
 

@@ -77,7 +77,7 @@ impl Rows {
     pub fn asked(&self) -> Vec<String> {
         let mut names: Vec<String> = Vec::new();
         for pattern in &self.columns {
-            let fit = |name: &&String| fits(pattern, name);
+            let fit = |name: &&String| matches_pattern(pattern, name);
             let mut found: Vec<&String> =
                 self.reports().flat_map(|report| report.values.keys()).filter(fit).collect();
             found.sort_by_key(|name| natural(name));
@@ -198,12 +198,12 @@ fn verdict(report: &Report) -> String {
     if missed.is_empty() { "yes".to_owned() } else { format!("no: {}", missed.join(" ")) }
 }
 
-/// Returns whether a name fits a pattern in which `*` stands for any text.
-pub(crate) fn fits(pattern: &str, name: &str) -> bool {
+/// Returns whether a name matches_pattern a pattern in which `*` stands for any text.
+pub(crate) fn matches_pattern(pattern: &str, name: &str) -> bool {
     match pattern.split_once('*') {
         None => pattern == name,
         Some((before, after)) => name.strip_prefix(before).is_some_and(|rest| {
-            (0..=rest.len()).filter(|&at| rest.is_char_boundary(at)).any(|at| fits(after, &rest[at..]))
+            (0..=rest.len()).filter(|&at| rest.is_char_boundary(at)).any(|at| matches_pattern(after, &rest[at..]))
         }),
     }
 }
@@ -227,8 +227,8 @@ mod tests {
 
     #[test]
     fn patterns_and_their_order() {
-        assert!(fits("layer-*.mean_alpha", "layer-12.mean_alpha") && fits("a", "a") && fits("*", ""));
-        assert!(!fits("layer-*.mean_alpha", "layer-1.least_alpha") && !fits("a", "ab") && !fits("a*b", "a"));
+        assert!(matches_pattern("layer-*.mean_alpha", "layer-12.mean_alpha") && matches_pattern("a", "a") && matches_pattern("*", ""));
+        assert!(!matches_pattern("layer-*.mean_alpha", "layer-1.least_alpha") && !matches_pattern("a", "ab") && !matches_pattern("a*b", "a"));
         let mut names = ["layer-10.x", "layer-9.x", "layer-9.a"];
         names.sort_by_key(|name| natural(name));
         assert_eq!(names, ["layer-9.a", "layer-9.x", "layer-10.x"]);

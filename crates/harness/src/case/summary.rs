@@ -1,8 +1,8 @@
 //! Summary of a finished run: what was solved, its main values, the verdict, where the results are.
 
 use super::rows::natural;
-use super::terminal::Style;
-use super::{Finished, Program, fits};
+use super::terminal::TerminalStyle;
+use super::{Finished, Program, matches_pattern};
 use crate::report::{FILE_NAME, Kind, Report, aligned};
 use crate::scene::Source;
 use std::collections::{BTreeMap, BTreeSet};
@@ -25,7 +25,7 @@ pub(super) fn summary(
     finished: &Finished,
     output: &Path,
     wall: Duration,
-    style: &Style,
+    style: &TerminalStyle,
 ) -> String {
     let report = &finished.report;
     let mut text = String::new();
@@ -121,7 +121,7 @@ impl<'a> Names<'a> {
     }
 
     fn is_like(&self, pattern: &str, name: &str) -> bool {
-        fits(pattern, name) || fits(pattern, self.split(name).0)
+        matches_pattern(pattern, name) || matches_pattern(pattern, self.split(name).0)
     }
 
     fn scalars(&self) -> impl Iterator<Item = &'a str> {
@@ -225,7 +225,7 @@ fn by_variant(names: &Names, shown: &[&str], width: usize) -> String {
 }
 
 /// Returns the number of expectations that are met, by kind of evidence, and all that are not.
-fn verdict(report: &Report, style: &Style) -> String {
+fn verdict(report: &Report, style: &TerminalStyle) -> String {
     let met = report.expect.iter().filter(|one| one.pass).count();
     let all = report.expect.len();
     let mut text = String::new();
@@ -251,7 +251,7 @@ fn verdict(report: &Report, style: &Style) -> String {
 }
 
 /// Returns the paths of the results, and the next command.
-fn files(output: &Path, style: &Style) -> String {
+fn files(output: &Path, style: &TerminalStyle) -> String {
     let entries = std::fs::read_dir(output).into_iter().flatten().flatten();
     let mut names: Vec<String> = entries.filter_map(|entry| entry.file_name().into_string().ok()).collect();
     names.sort_by_key(|name| natural(name));
@@ -327,13 +327,13 @@ mod tests {
         assert!(rows[4].starts_with("balance  1"), "{table}");
         let listed = main_values(&report, &["error".to_owned()], &[], 100);
         assert!(listed.starts_with("variant  error\n") && !listed.contains("balance"), "{listed}");
-        assert!(verdict(&report, &Style::plain()).starts_with("3 of 3 expectations met: 3 bounds"));
+        assert!(verdict(&report, &TerminalStyle::plain()).starts_with("3 of 3 expectations met: 3 bounds"));
     }
 
     #[test]
     fn failures_are_shown_in_full() {
         let report = report(&[expect("balance", "at_least = 1"), expect("gone", "at_most = 1")].concat());
-        let text = verdict(&report, &Style::plain());
+        let text = verdict(&report, &TerminalStyle::plain());
         assert!(text.starts_with("0 of 2 expectations met"), "{text}");
         assert!(text.contains("FAIL  balance") && text.contains("FAIL  gone"), "{text}");
     }
@@ -352,7 +352,7 @@ mod tests {
             Source::new("s.toml", "version = 1\ntitle = \"T\"\n[report]\nvalues = [\"a*\", \"peak\"]\n");
         let program =
             Program { name: "test", version: "1", about: "", examples: "", magic: b"test-001", columns: &[] };
-        let style = Style::plain();
+        let style = TerminalStyle::plain();
         let text = summary(&program, &source, &finished, folder.path(), Duration::from_secs(3), &style);
         assert!(text.lines().count() <= 25, "{text}");
         assert!(text.starts_with("T\ntest 1: 3 variants, 30 particles in 3.0 s on "), "{text}");

@@ -49,13 +49,13 @@ const WIDTH: usize = 100;
 
 /// Colours and width of standard output.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Style {
+pub(super) struct TerminalStyle {
     colors: bool,
     /// Columns that a line may take.
     pub width: usize,
 }
 
-impl Style {
+impl TerminalStyle {
     /// Returns the style of standard output: no colours if it is no terminal or `NO_COLOR` is set.
     pub fn of_output() -> Self {
         let terminal = std::io::stdout().is_terminal();
@@ -286,11 +286,11 @@ mod tests {
 
     #[test]
     fn lines_are_broken_between_words() {
-        let style = Style { colors: false, width: 12 };
+        let style = TerminalStyle { colors: false, width: 12 };
         assert_eq!(style.wrapped("  one two three four"), "  one two\n    three\n    four\n");
         assert_eq!(style.fitted("one two three four"), "one two thr…");
         assert_eq!(style.red("x"), "x");
-        assert_eq!(Style { colors: true, width: 12 }.red("x"), "\x1b[31mx\x1b[0m");
+        assert_eq!(TerminalStyle { colors: true, width: 12 }.red("x"), "\x1b[31mx\x1b[0m");
     }
 
     #[test]

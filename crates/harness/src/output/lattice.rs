@@ -68,8 +68,8 @@ pub(crate) fn joined<const D: usize>(
     (0..next.len() as u32).into_par_iter().map(of).collect()
 }
 
-/// Cells around the particles of a lattice along its first `axes` axes.
-pub(crate) struct Cells<'a, const D: usize> {
+/// LatticeCells around the particles of a lattice along its first `axes` axes.
+pub(crate) struct LatticeCells<'a, const D: usize> {
     /// Positions.
     pub positions: &'a [[f64; D]],
     /// Pairs of neighbours from [`joined`].
@@ -80,7 +80,7 @@ pub(crate) struct Cells<'a, const D: usize> {
     pub axes: usize,
 }
 
-impl<const D: usize> Cells<'_, D> {
+impl<const D: usize> LatticeCells<'_, D> {
     fn beside(&self, particle: usize, side: usize) -> Option<usize> {
         Some(self.joined[particle][side] as usize).filter(|&other| other != NONE as usize)
     }

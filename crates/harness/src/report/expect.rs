@@ -232,12 +232,12 @@ struct Written {
     kind: Kind,
     /// Source of the figure and its tolerance.
     source: String,
-    #[serde(default = "yes")]
+    #[serde(default = "default_true")]
     /// Judged in `--quick` runs too.
     quick: bool,
 }
 
-fn yes() -> bool {
+fn default_true() -> bool {
     true
 }
 

@@ -12,9 +12,9 @@ pub struct ShownUnit {
 }
 
 /// A dimension: the unit of reports and its spellings, and units in which it may be shown, the largest first.
-type Dimension = (&'static [&'static str], &'static [(&'static str, f64)]);
+type UnitChoices = (&'static [&'static str], &'static [(&'static str, f64)]);
 
-const DIMENSIONS: &[Dimension] = &[
+const DIMENSIONS: &[UnitChoices] = &[
     (&["m"], &[("m", 1.0), ("cm", 1e2), ("mm", 1e3), ("µm", 1e6), ("nm", 1e9)]),
     (&["m²", "m^2"], &[("m²", 1.0), ("mm²", 1e6)]),
     (&["m³", "m^3"], &[("m³", 1.0), ("mm³", 1e9)]),

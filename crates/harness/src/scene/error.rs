@@ -12,20 +12,20 @@ use super::{EXIT_BAD_INPUT, Source, VERSION, locate};
 
 /// Error in a scene: a [`miette::Diagnostic`] with file, line, caret and help.
 #[derive(Debug)]
-pub struct SceneError(Box<Inside>);
+pub struct SceneError(Box<ErrorContent>);
 
 #[derive(Debug)]
-struct Inside {
+struct ErrorContent {
     code: &'static str,
     message: String,
     key: Option<String>,
     help: Option<String>,
     /// Label, place, line and text; none when the file could not be read at all.
-    place: Option<Place>,
+    place: Option<ErrorPlace>,
 }
 
 #[derive(Debug)]
-struct Place {
+struct ErrorPlace {
     /// Bytes in the longest line that the picture would show.
     longest_line: usize,
     label: String,
@@ -67,15 +67,15 @@ impl SceneError {
     /// The message with the lines of the source it is about, as the command lines print it: one message line,
     /// never wrapped, so that it can be searched for; in colours if standard error is a terminal.
     pub fn render(&self) -> String {
-        self.drawn(std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none())
+        self.render_with(std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none())
     }
 
     /// [`Self::render`] without colours, for messages that other programs show.
     pub fn plain(&self) -> String {
-        self.drawn(false)
+        self.render_with(false)
     }
 
-    fn drawn(&self, colors: bool) -> String {
+    fn render_with(&self, colors: bool) -> String {
         let theme = if colors { GraphicalTheme::unicode() } else { GraphicalTheme::unicode_nocolor() };
         let handler = GraphicalReportHandler::new_themed(theme).with_wrap_lines(false);
         let mut text = String::new();
@@ -96,10 +96,10 @@ impl SceneError {
 
     pub(super) fn file(path: &Path, code: &'static str, what: String, help: Option<String>) -> Self {
         let message = format!("{}: {what}", path.display());
-        Self(Box::new(Inside { code, message, key: None, help, place: None }))
+        Self(Box::new(ErrorContent { code, message, key: None, help, place: None }))
     }
 
-    fn at(
+    fn from_span(
         source: &Source,
         code: &'static str,
         key: Option<String>,
@@ -116,8 +116,8 @@ impl SceneError {
         let from = source.text[..start].rmatch_indices('\n').nth(1).map_or(0, |(at, _)| at);
         let to = source.text[end..].match_indices('\n').nth(1).map_or(length, |(at, _)| end + at);
         let longest_line = source.text[from..to].lines().map(str::len).max().unwrap_or(0);
-        let place = Place { longest_line, label: String::new(), span: start..end, line, text };
-        Self(Box::new(Inside { code, message, key, help: None, place: Some(place) }))
+        let place = ErrorPlace { longest_line, label: String::new(), span: start..end, line, text };
+        Self(Box::new(ErrorContent { code, message, key, help: None, place: Some(place) }))
     }
 
     fn label(mut self, label: impl Into<String>) -> Self {
@@ -142,7 +142,7 @@ impl SceneError {
         }
         let help = cut.then(|| "the text ends unexpectedly; is the file complete?".to_owned());
         let message = format!("not valid TOML: {}", error.message());
-        Self::at(source, "scene::syntax", None, span, message).label("here").help(help)
+        Self::from_span(source, "scene::syntax", None, span, message).label("here").help(help)
     }
 
     pub(super) fn no_version(source: &Source, similar: Option<(String, Range<usize>)>) -> Self {
@@ -151,23 +151,23 @@ impl SceneError {
             format!("missing `version`; allowed: `version = {VERSION}`{}", suggestion.unwrap_or_default());
         let span = similar.map_or(0..0, |(_, span)| span);
         let help = Some(format!("begin the file with `version = {VERSION}`"));
-        Self::at(source, "scene::version", Some("version".into()), span, message).label("here").help(help)
+        Self::from_span(source, "scene::version", Some("version".into()), span, message).label("here").help(help)
     }
 
     pub(super) fn bad_version(source: &Source, span: Range<usize>) -> Self {
         let found = source.text.get(span.clone()).unwrap_or_default();
         let message = format!("`version`: found {}; allowed: {VERSION}", shorten(found));
-        Self::at(source, "scene::version", Some("version".into()), span, message).label("here")
+        Self::from_span(source, "scene::version", Some("version".into()), span, message).label("here")
     }
 
     pub(super) fn value(source: &Source, key: &str, span: Range<usize>, found: &str, allowed: &str) -> Self {
         let message = format!("`{key}`: found {found}; allowed: {allowed}");
-        Self::at(source, "scene::value", Some(key.into()), span, message).label("here")
+        Self::from_span(source, "scene::value", Some(key.into()), span, message).label("here")
     }
 
     pub(super) fn refused(source: &Source, key: String, span: Range<usize>, what: &str) -> Self {
         let message = format!("`{key}`: {what}");
-        Self::at(source, "scene::value", Some(key), span, message).label("found here")
+        Self::from_span(source, "scene::value", Some(key), span, message).label("found here")
     }
 
     pub(super) fn missing(source: &Source, key: String, span: Range<usize>, why: &str) -> Self {
@@ -175,17 +175,17 @@ impl SceneError {
         // a block that the file lacks belongs to its end
         let end = source.text.trim_end().len();
         let span = if span.is_empty() { end.saturating_sub(1)..end } else { span };
-        Self::at(source, "scene::missing_key", Some(key), span, message).label("needed here")
+        Self::from_span(source, "scene::missing_key", Some(key), span, message).label("needed here")
     }
 
     pub(super) fn unexpected(source: &Source, key: String, span: Range<usize>, why: &str) -> Self {
         let message = format!("unexpected `{key}`: {why}");
-        Self::at(source, "scene::unexpected_key", Some(key), span, message).label("remove this")
+        Self::from_span(source, "scene::unexpected_key", Some(key), span, message).label("remove this")
     }
 
     pub(super) fn conflict(source: &Source, key: String, span: Range<usize>, other: &str, why: &str) -> Self {
         let message = format!("`{key}` conflicts with `{other}`: {why}");
-        Self::at(source, "scene::conflict", Some(key), span, message).label("here")
+        Self::from_span(source, "scene::conflict", Some(key), span, message).label("here")
     }
 
     /// Translates serde's words for the reader of a TOML file.
@@ -230,7 +230,7 @@ impl SceneError {
             let place = if path == name { 0..0 } else { span };
             let message = format!("missing `{path}`");
             let label = format!("`{name}` is needed here");
-            return Self::at(source, "scene::missing_key", Some(path), place, message).label(label);
+            return Self::from_span(source, "scene::missing_key", Some(path), place, message).label(label);
         }
         Self::wrong(source, parent, span, serde)
     }
@@ -239,7 +239,7 @@ impl SceneError {
         let words = translate(serde);
         match key {
             Some(key) => Self::refused(source, key, span, &words),
-            None => Self::at(source, "scene::value", None, span, words).label("found here"),
+            None => Self::from_span(source, "scene::value", None, span, words).label("found here"),
         }
     }
 
@@ -280,7 +280,7 @@ impl SceneError {
             .map(|advice| format!("; {advice}"))
             .unwrap_or_default();
         let message = format!("{what}; allowed: {list}{hint}{advice}");
-        Self::at(source, code, Some(key), span, message).label(label)
+        Self::from_span(source, code, Some(key), span, message).label(label)
     }
 }
 

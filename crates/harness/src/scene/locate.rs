@@ -6,7 +6,7 @@ use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue};
 
 type Key<'i> = Spanned<DeString<'i>>;
-type Value<'i> = Spanned<DeValue<'i>>;
+type TreeValue<'i> = Spanned<DeValue<'i>>;
 
 /// The span of the value at `path` (`a.b[2].c`), or of its nearest existing parent other than the root.
 pub(super) fn span(root: &DeTable<'_>, path: &str) -> Option<Range<usize>> {
@@ -16,13 +16,13 @@ pub(super) fn span(root: &DeTable<'_>, path: &str) -> Option<Range<usize>> {
 }
 
 /// The value at `path`.
-pub(super) fn value<'t, 'i>(root: &'t DeTable<'i>, path: &str) -> Option<&'t Value<'i>> {
+pub(super) fn value<'t, 'i>(root: &'t DeTable<'i>, path: &str) -> Option<&'t TreeValue<'i>> {
     let mut last = None;
     walk(root, path, &mut |value| last = Some(value)).then_some(last).flatten()
 }
 
 /// Visits what lies on the way to `path`; whether its end exists. A key may itself be a path, in quotes.
-fn walk<'t, 'i>(table: &'t DeTable<'i>, path: &str, visit: &mut impl FnMut(&'t Value<'i>)) -> bool {
+fn walk<'t, 'i>(table: &'t DeTable<'i>, path: &str, visit: &mut impl FnMut(&'t TreeValue<'i>)) -> bool {
     let mut ends: Vec<usize> = path.match_indices('.').map(|(at, _)| at).collect();
     ends.push(path.len());
     // the longest name first
@@ -89,7 +89,7 @@ pub(super) fn key(root: &DeTable<'_>, parent: &str, name: &str) -> Option<(Strin
 fn visit<'t, 'i>(
     table: &'t DeTable<'i>,
     above: &str,
-    each: &mut impl FnMut(&str, Option<&'t Key<'i>>, &'t Value<'i>),
+    each: &mut impl FnMut(&str, Option<&'t Key<'i>>, &'t TreeValue<'i>),
 ) {
     for (key, value) in table {
         let name = key.get_ref();
@@ -100,9 +100,9 @@ fn visit<'t, 'i>(
 }
 
 fn inside<'t, 'i>(
-    value: &'t Value<'i>,
+    value: &'t TreeValue<'i>,
     path: &str,
-    each: &mut impl FnMut(&str, Option<&'t Key<'i>>, &'t Value<'i>),
+    each: &mut impl FnMut(&str, Option<&'t Key<'i>>, &'t TreeValue<'i>),
 ) {
     match value.get_ref() {
         DeValue::Table(table) => visit(table, path, each),

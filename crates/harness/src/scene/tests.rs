@@ -10,24 +10,24 @@ use polycore::units::{Length, Ratio};
 #[allow(dead_code)]
 struct Scene {
     name: Option<String>,
-    body: Body,
+    body: BodySpec,
     #[serde(default)]
-    load: Vec<Load>,
+    load: Vec<LoadSpec>,
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 #[allow(dead_code)]
-struct Body {
+struct BodySpec {
     spacing: Length,
     horizon: f64,
     count: Option<u32>,
-    law: Option<Law>,
+    law: Option<LawSpec>,
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-enum Law {
+enum LawSpec {
     Subtract,
     Shift,
     Chain,
@@ -36,7 +36,7 @@ enum Law {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[allow(dead_code)]
-struct Load {
+struct LoadSpec {
     at: [Length; 2],
     weight: Ratio,
 }
@@ -88,7 +88,7 @@ fn rendered(error: &SceneError) -> String {
 fn good_scene() {
     let scene: Scene = Source::new("scene.toml", GOOD).parse().unwrap();
     assert_eq!(scene.body.spacing.si(), 0.002);
-    assert!(matches!(scene.body.law, Some(Law::Chain)));
+    assert!(matches!(scene.body.law, Some(LawSpec::Chain)));
     assert_eq!(scene.load[1].weight.si(), 0.5);
 }
 
@@ -321,8 +321,8 @@ set = { "load[0].weight" = "3 kg", "body.count" = 12 }
 struct WithStudies {
     #[serde(flatten)]
     _rest: BTreeMap<String, serde::de::IgnoredAny>,
-    body: Body,
-    load: Vec<Load>,
+    body: BodySpec,
+    load: Vec<LoadSpec>,
 }
 
 #[test]
@@ -338,7 +338,7 @@ fn parts_stand_in_for_others() {
     // merged: the rest stays
     let merged = source.with_merged("study[1].set");
     let found = of(merged.clone()).unwrap();
-    assert!(matches!(found.body.law, Some(Law::Shift)) && found.body.spacing.si() == 2e-3);
+    assert!(matches!(found.body.law, Some(LawSpec::Shift)) && found.body.spacing.si() == 2e-3);
     assert_eq!(found.load.iter().map(|load| load.weight.si()).collect::<Vec<_>>(), [0.5, 0.25]);
     assert_eq!(merged.error("load[1].weight", 1, 2).line(), Some(22));
     assert_eq!(merged.error("body.law", 1, 2).key(), Some("study[1].set.body.law"));

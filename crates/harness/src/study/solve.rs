@@ -5,7 +5,7 @@
 //! own any more. A variant's numbers do not depend on the threads, so neither do those of a scene.
 
 use super::Naming;
-use crate::case::{Fault, Kept, Options, Run, Step};
+use crate::case::{Fault, VariantCheckpoint, Options, Run, Step};
 use crate::scene::Failure;
 use polycore::Error;
 use serde::Serialize;
@@ -89,7 +89,7 @@ where
             whole.states.insert(index, state);
             whole.save()
         };
-        let mut own = lock(&whole).run.of_variant(options, Kept { keep: &keep, reached });
+        let mut own = lock(&whole).run.of_variant(options, VariantCheckpoint { keep: &keep, reached });
         let outcome = solve(index, &mut own)?;
         drop(own);
         let mut whole = lock(&whole);

@@ -7,7 +7,7 @@ use crate::output::vtkhdf::{self, Cells, Series};
 use polycore::Error;
 
 /// Steps that are read on demand.
-pub struct Frames {
+pub struct FrameReader {
     /// NAME of NAME.vtkhdf.
     pub name: String,
     /// Particles that move: time counts load steps. Otherwise a mesh that stands still, and time is in
@@ -18,7 +18,7 @@ pub struct Frames {
     files: Vec<PathBuf>,
 }
 
-impl Frames {
+impl FrameReader {
     /// All field files of a folder by name, those of an unfinished run included.
     ///
     /// # Errors

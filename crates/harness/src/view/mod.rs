@@ -15,11 +15,11 @@ use crate::case::{Names, main_names, natural};
 use crate::checkpoint;
 use crate::report::{self, Report, SceneUnits, Value};
 use crate::scene::Source;
-use body::{Body, Detail};
-use frames::Frames;
+use body::{PageBody, Detail};
+use frames::FrameReader;
 use polycore::Error;
 use polycore::file::atomic_write;
-use tables::Tables;
+use tables::PageTables;
 
 mod body;
 mod frames;
@@ -53,8 +53,8 @@ struct Found {
     report: Option<Report>,
     /// The run has not ended.
     unfinished: bool,
-    bodies: Vec<(String, Frames)>,
-    tables: Tables,
+    bodies: Vec<(String, FrameReader)>,
+    tables: PageTables,
 }
 
 /// The page of a run in a folder, as HTML.
@@ -122,7 +122,7 @@ impl Found {
         for name in names.iter().filter_map(|name| name.strip_suffix(".csv")) {
             self.tables.file(&folder.join(format!("{name}.csv")), &format!("{prefix}{name}"))?;
         }
-        self.bodies.extend(Frames::all(folder)?.into_iter().map(|frames| (prefix.to_owned(), frames)));
+        self.bodies.extend(FrameReader::all(folder)?.into_iter().map(|frames| (prefix.to_owned(), frames)));
         Ok(())
     }
 
@@ -149,13 +149,13 @@ impl Found {
     }
 
     /// Bodies and their numbers as text, each within its share of the page.
-    fn bodies(&self) -> Result<Vec<(Body, String)>, Error> {
+    fn bodies(&self) -> Result<Vec<(PageBody, String)>, Error> {
         let share = FIELDS / self.bodies.len().clamp(1, BODIES);
-        let fitting = |(prefix, frames): &(String, Frames)| {
+        let fitting = |(prefix, frames): &(String, FrameReader)| {
             let bridge = self.bridge(&frames.name);
             let mut detail = Detail { steps: STEPS, coarser: 1 };
             loop {
-                let (body, store) = Body::new(frames, format!("{prefix}{}", frames.name), bridge, detail)?;
+                let (body, store) = PageBody::new(frames, format!("{prefix}{}", frames.name), bridge, detail)?;
                 let text = store.text();
                 let least = detail.coarser >= COARSEST && detail.steps <= 2;
                 if text.len() <= share || least {
@@ -186,7 +186,7 @@ impl Detail {
 
 /// A scalar of the report, in the unit of the scene.
 #[derive(Serialize)]
-struct Scalar<'a> {
+struct PageScalar<'a> {
     name: &'a str,
     /// The name without its variant.
     quantity: &'a str,
@@ -200,7 +200,7 @@ struct Scalar<'a> {
 }
 
 /// Returns the scalars of a report, the main ones first if there are more than fit.
-fn scalars<'a>(report: &'a Report, main: &[String], units: &SceneUnits) -> Vec<Scalar<'a>> {
+fn scalars<'a>(report: &'a Report, main: &[String], units: &SceneUnits) -> Vec<PageScalar<'a>> {
     let names = Names::new(report);
     let mut pass: BTreeMap<&str, bool> = BTreeMap::new();
     for one in &report.expect {
@@ -214,7 +214,7 @@ fn scalars<'a>(report: &'a Report, main: &[String], units: &SceneUnits) -> Vec<S
         let largest =
             same.filter_map(|other| report.scalar(other)).fold(value.abs(), |most, x| most.max(x.abs()));
         let shown = units.shown(unit, largest);
-        Some(Scalar {
+        Some(PageScalar {
             name,
             quantity,
             variant,
@@ -224,8 +224,8 @@ fn scalars<'a>(report: &'a Report, main: &[String], units: &SceneUnits) -> Vec<S
             pass: pass.get(name.as_str()).copied(),
         })
     });
-    let (first, rest): (Vec<Scalar>, Vec<Scalar>) = each.partition(|scalar| scalar.main.is_some());
-    let mut all: Vec<Scalar> = first.into_iter().chain(rest).take(SCALARS).collect();
+    let (first, rest): (Vec<PageScalar>, Vec<PageScalar>) = each.partition(|scalar| scalar.main.is_some());
+    let mut all: Vec<PageScalar> = first.into_iter().chain(rest).take(SCALARS).collect();
     all.sort_by_key(|scalar| natural(scalar.name));
     all
 }
@@ -256,7 +256,7 @@ fn verdict(report: Option<&Report>, unfinished: bool) -> Json {
 }
 
 fn page(name: &str, found: Found) -> Result<String, Error> {
-    let (bodies, numbers): (Vec<Body>, Vec<String>) = found.bodies()?.into_iter().unzip();
+    let (bodies, numbers): (Vec<PageBody>, Vec<String>) = found.bodies()?.into_iter().unzip();
     let beyond = found.bodies.iter().skip(BODIES).map(|(prefix, frames)| format!("{prefix}{}", frames.name));
     let mut left_out: Vec<String> = beyond.chain(found.tables.left_out.iter().cloned()).collect();
     let scene = found.report.as_ref().map_or("", |report| report.provenance.scene.as_str());

@@ -8,9 +8,9 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use serde::Serialize;
 
-/// Levels of positions and displacements: a 16th of a pixel on a screen of a thousand.
+/// LevelRange of positions and displacements: a 16th of a pixel on a screen of a thousand.
 pub const PLACES: u16 = 16_383;
-/// Levels of fields: a quarter of a thousandth of the colour bar.
+/// LevelRange of fields: a quarter of a thousandth of the colour bar.
 pub const VALUES: u16 = 4_095;
 /// Stands for no value.
 pub const NOTHING: u16 = u16::MAX;
@@ -28,14 +28,14 @@ pub struct Slot {
 
 /// The range of quantised numbers: level k stands for `low + k · step`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Levels {
+pub struct LevelRange {
     /// The least number.
     pub low: f64,
     /// Distance of levels.
     pub step: f64,
 }
 
-impl Levels {
+impl LevelRange {
     /// Returns `count` + 1 levels over the finite numbers, if there are any.
     pub fn over(numbers: impl IntoIterator<Item = f64>, count: u16) -> Option<Self> {
         let finite = numbers.into_iter().filter(|number| number.is_finite());
@@ -138,15 +138,15 @@ mod tests {
     #[test]
     fn levels_cover_the_finite_numbers() {
         let numbers = [f64::NAN, -1.5, 3.0, f64::INFINITY, 0.1];
-        let levels = Levels::over(numbers, VALUES).unwrap();
+        let levels = LevelRange::over(numbers, VALUES).unwrap();
         assert_eq!((levels.level(-1.5), levels.level(3.0), levels.level(f64::NAN)), (0, VALUES, NOTHING));
         let back = levels.low + f64::from(levels.level(0.1)) * levels.step;
         assert!((back - 0.1).abs() <= 0.5 * levels.step, "{back}");
-        let constant = Levels::over([2.0, 2.0], VALUES).unwrap();
+        let constant = LevelRange::over([2.0, 2.0], VALUES).unwrap();
         assert_eq!((constant.low, constant.step, constant.level(2.0)), (2.0, 0.0, 0));
-        assert_eq!(Levels::over([f64::NAN], VALUES), None);
+        assert_eq!(LevelRange::over([f64::NAN], VALUES), None);
         // the difference of the ends is not finite
-        let wide = Levels::over([-1e308, 1e308], VALUES).unwrap();
+        let wide = LevelRange::over([-1e308, 1e308], VALUES).unwrap();
         assert!(wide.step.is_finite() && wide.level(1e308) == VALUES);
     }
 }

@@ -4,8 +4,8 @@
 use polycore::numerics::DisjointSets;
 use rayon::prelude::*;
 
-use super::solid::{HEXAHEDRON, QUADRILATERAL, Solid};
-use crate::output::lattice::{Cells, NONE, Sides, joined, neighbours};
+use super::solid::{HEXAHEDRON, QUADRILATERAL, PageSolid};
+use crate::output::lattice::{LatticeCells, NONE, Sides, joined, neighbours};
 
 /// Particles of a lattice that are drawn at most, and of a cloud, whose blocks share no corners.
 const MOST: [usize; 2] = [30_000, 8_000];
@@ -20,7 +20,7 @@ const ASKED: usize = 100;
 
 /// Particles of a body that are drawn, and their sizes.
 #[derive(Debug)]
-pub struct Choice {
+pub struct ParticleChoice {
     /// Numbers of the particles.
     pub kept: Vec<u32>,
     /// Sides of a cell, m.
@@ -30,7 +30,7 @@ pub struct Choice {
     lattice: bool,
 }
 
-impl Choice {
+impl ParticleChoice {
     /// The particles that are drawn: all, or every k-th along each axis of a large body; `coarser` drops
     /// more.
     pub fn of(reference: &[[f64; 3]], coarser: usize) -> Self {
@@ -84,7 +84,7 @@ impl Choice {
 
     /// The solid, with the displacement of its points at each step of `positions`, those of the chosen
     /// particles. Neighbours up to `bridge` spacings apart have no crack between them.
-    pub fn solid(&self, reference: &[[f64; 3]], positions: &[Vec<[f64; 3]>], bridge: f64) -> Solid {
+    pub fn solid(&self, reference: &[[f64; 3]], positions: &[Vec<[f64; 3]>], bridge: f64) -> PageSolid {
         // lengths in spacings
         let scaled = |x: &[f64; 3]| [0, 1, 2].map(|d| x[d] / self.sides[d]);
         let rest: Vec<[f64; 3]> = reference.iter().map(scaled).collect();
@@ -109,7 +109,7 @@ impl Choice {
         }
         let (owner, corner_of) = self.corners(&always);
         let place = |positions: &[[f64; 3]], joined: &[Sides], &(particle, corner): &(u32, u8)| -> [f64; 3] {
-            let cells = Cells { positions, joined, spacing: 1.0, axes: if self.plane { 2 } else { 3 } };
+            let cells = LatticeCells { positions, joined, spacing: 1.0, axes: if self.plane { 2 } else { 3 } };
             let at = cells.corner(particle as usize, corner);
             [0, 1, 2].map(|d| at[d] * self.sides[d])
         };
@@ -124,7 +124,7 @@ impl Choice {
                 owner.iter().zip(&points).map(u).collect()
             })
             .collect();
-        Solid {
+        PageSolid {
             points,
             moved,
             kinds: vec![if self.plane { QUADRILATERAL } else { HEXAHEDRON }; reference.len()],
@@ -205,7 +205,7 @@ mod tests {
         let rest = lattice([6, 5, 4]);
         let image =
             |x: &[f64; 3]| [2.0 * x[0] + 0.3 * x[1], 0.9 * x[1] - 0.1 * x[2], 1.1 * x[2] + 0.2 * x[0]];
-        let choice = Choice::of(&rest, 1);
+        let choice = ParticleChoice::of(&rest, 1);
         assert!(
             (0..3).all(|d| (choice.sides[d] - [0.5, 0.2, 0.5][d]).abs() < 1e-12)
                 && !choice.plane
@@ -234,7 +234,7 @@ mod tests {
         let rest = lattice([8, 6, 1]);
         let torn: Vec<[f64; 3]> =
             rest.iter().map(|x| [x[0], x[1] + if x[1] > 0.5 { 1.0 } else { 0.0 }, 0.0]).collect();
-        let choice = Choice::of(&rest, 1);
+        let choice = ParticleChoice::of(&rest, 1);
         assert!(choice.plane);
         let solid = choice.solid(&rest, &[rest.clone(), torn], 100.0);
         assert_eq!(solid.points.len(), 9 * 7 + 9, "a second row of corners");
@@ -246,17 +246,17 @@ mod tests {
     #[test]
     fn fewer_of_many_and_clouds() {
         let rest = lattice([100, 80, 10]);
-        let choice = Choice::of(&rest, 1);
+        let choice = ParticleChoice::of(&rest, 1);
         assert!(choice.kept.len() <= MOST[0] && choice.kept.len() > MOST[0] / 10, "{}", choice.kept.len());
         let extent = 100.0 * 80.0 * 10.0 * 0.05;
         let volume = choice.kept.len() as f64 * choice.sides.iter().product::<f64>();
         assert!((volume / extent - 1.0).abs() < 0.1, "{volume} of {extent}");
-        assert!(Choice::of(&rest, 4).kept.len() < choice.kept.len() / 3);
+        assert!(ParticleChoice::of(&rest, 4).kept.len() < choice.kept.len() / 3);
         // a turned lattice is a cloud
         let (s, c) = 0.4f64.sin_cos();
         let turned: Vec<[f64; 3]> =
             lattice([30, 20, 1]).iter().map(|x| [c * x[0] - s * x[1], s * x[0] + c * x[1], 0.0]).collect();
-        let choice = Choice::of(&turned, 1);
+        let choice = ParticleChoice::of(&turned, 1);
         assert!(
             !choice.lattice && choice.plane && (choice.sides[0] - 0.2).abs() < 1e-9,
             "{:?}",
@@ -266,6 +266,6 @@ mod tests {
         assert_eq!(solid.points.len(), 4 * 600);
         // one particle
         let one = [[1.0, 2.0, 0.0]];
-        assert_eq!(Choice::of(&one, 1).solid(&one, &[one.to_vec()], 2.0).points.len(), 4);
+        assert_eq!(ParticleChoice::of(&one, 1).solid(&one, &[one.to_vec()], 2.0).points.len(), 4);
     }
 }

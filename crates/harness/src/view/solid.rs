@@ -38,7 +38,7 @@ const POINTS: usize = 9_000;
 
 /// Points, cells, and displacements at steps.
 #[derive(Debug, Default)]
-pub struct Solid {
+pub struct PageSolid {
     /// Before any displacement, m.
     pub points: Vec<[f64; 3]>,
     /// The displacement of each point at each step, m; no steps where nothing moves.
@@ -58,7 +58,7 @@ pub fn corners_of(kind: u8) -> usize {
     DRAWN.iter().find(|(_, linear, _)| *linear == kind).map_or(0, |(_, _, corners)| *corners)
 }
 
-impl Solid {
+impl PageSolid {
     /// A mesh; one of very many cells with fewer, `coarser` with fewer still. Cells of other types are left
     /// out.
     pub fn mesh(points: &[[f64; 3]], cells: &Cells, coarser: usize) -> Self {
@@ -201,7 +201,7 @@ mod tests {
         (points, cells)
     }
 
-    fn volume(solid: &Solid) -> f64 {
+    fn volume(solid: &PageSolid) -> f64 {
         let (mut sum, mut first) = (0.0, 0);
         for &kind in &solid.kinds {
             let corners = &solid.corners[first..first + corners_of(kind)];
@@ -218,7 +218,7 @@ mod tests {
     #[test]
     fn meshes_by_their_corners() {
         let (points, cells) = brick(3);
-        let solid = Solid::mesh(&points, &cells, 1).by_kind();
+        let solid = PageSolid::mesh(&points, &cells, 1).by_kind();
         assert_eq!((solid.kinds.len(), solid.points.len()), (28, 64 + 4));
         assert_eq!(
             (solid.kinds[0], solid.cell_of[0]),
@@ -226,7 +226,7 @@ mod tests {
             "types together, vertices left out"
         );
         let hexahedra =
-            Solid { kinds: solid.kinds[1..].to_vec(), corners: solid.corners[4..].to_vec(), ..solid };
+            PageSolid { kinds: solid.kinds[1..].to_vec(), corners: solid.corners[4..].to_vec(), ..solid };
         assert!((volume(&hexahedra) - 1.0).abs() < 1e-12);
     }
 
@@ -234,11 +234,11 @@ mod tests {
     #[test]
     fn large_meshes_become_coarse() {
         let (points, cells) = brick(35);
-        let solid = Solid::mesh(&points, &cells, 1);
+        let solid = PageSolid::mesh(&points, &cells, 1);
         assert!(solid.points.len() <= POINTS && solid.points.len() > POINTS / 4, "{}", solid.points.len());
         assert!(solid.kinds.iter().all(|&kind| kind == TETRAHEDRON));
         assert!((volume(&solid) - 1.0).abs() < 0.1, "{}", volume(&solid));
-        assert!(Solid::mesh(&points, &cells, 4).points.len() <= POINTS / 4);
+        assert!(PageSolid::mesh(&points, &cells, 4).points.len() <= POINTS / 4);
         let source = |(k, &point): (usize, &u32)| solid.points[k] == points[point as usize];
         assert!(solid.point_of.iter().enumerate().all(source));
     }

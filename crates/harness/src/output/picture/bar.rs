@@ -1,7 +1,7 @@
 //! The colour bar beside a field.
 
 use super::axis::{labels, ticks};
-use super::canvas::{Anchor, BLACK, Canvas, Text};
+use super::canvas::{LabelAnchor, BLACK, Canvas, Text};
 use super::color::ColorMap;
 
 /// Sizes of letters: of a bar's name, of its ticks.
@@ -12,7 +12,7 @@ pub(super) const TICK_LENGTH: isize = 8;
 pub(super) const LINE: isize = 2;
 
 /// The colour bar with its ticks.
-pub(super) struct Bar {
+pub(super) struct ColorBar {
     ticks: Vec<(f64, Text)>,
     label: Text,
     below: bool,
@@ -22,7 +22,7 @@ pub(super) struct Bar {
     pub(super) height: usize,
 }
 
-impl Bar {
+impl ColorBar {
     /// Creates a bar for `low` to `high`; `beyond` says whether some values lie below, above.
     pub(super) fn new(
         label: &str,
@@ -73,9 +73,9 @@ impl Bar {
             let at = start + ((1.0 - share) * length as f64).round() as isize;
             let at = at.clamp(start, start + length - 1);
             canvas.rectangle(x + width + LINE, at - LINE / 2, TICK_LENGTH, LINE, BLACK);
-            canvas.text(x + width + LINE + TICK_LENGTH + 6, at, text, Anchor::Left);
+            canvas.text(x + width + LINE + TICK_LENGTH + 6, at, text, LabelAnchor::Left);
         }
         let far = x + self.width as isize - LABEL as isize * 3 / 4;
-        canvas.text(far, start + length / 2, &self.label, Anchor::Upwards);
+        canvas.text(far, start + length / 2, &self.label, LabelAnchor::Upwards);
     }
 }

@@ -22,7 +22,7 @@ pub(super) struct Canvas {
 
 /// Point of a text that its position gives.
 #[derive(Clone, Copy, PartialEq)]
-pub(super) enum Anchor {
+pub(super) enum LabelAnchor {
     /// Middle of the left edge.
     Left,
     /// Middle of the right edge.
@@ -155,7 +155,7 @@ impl Canvas {
         }
     }
 
-    pub(super) fn text(&mut self, x: isize, y: isize, text: &Text, anchor: Anchor) {
+    pub(super) fn text(&mut self, x: isize, y: isize, text: &Text, anchor: LabelAnchor) {
         let (width, height) = (text.width as isize, text.height as isize);
         for row in 0..height {
             for column in 0..width {
@@ -164,10 +164,10 @@ impl Canvas {
                     continue;
                 }
                 let (right, down) = match anchor {
-                    Anchor::Left => (column, row - height / 2),
-                    Anchor::Right => (column - width, row - height / 2),
-                    Anchor::Center => (column - width / 2, row - height / 2),
-                    Anchor::Upwards => (row - height / 2, width / 2 - column),
+                    LabelAnchor::Left => (column, row - height / 2),
+                    LabelAnchor::Right => (column - width, row - height / 2),
+                    LabelAnchor::Center => (column - width / 2, row - height / 2),
+                    LabelAnchor::Upwards => (row - height / 2, width / 2 - column),
                 };
                 self.blend(x + right, y + down, ink);
             }

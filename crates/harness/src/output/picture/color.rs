@@ -19,13 +19,13 @@ pub enum ColorMap {
 /// Colour of points without a number.
 pub(super) const MISSING: [u8; 3] = [190, 190, 190];
 
-type Table = [[u8; 3]; 256];
+type ColorTable = [[u8; 3]; 256];
 
-static VIRIDIS: LazyLock<Table> = LazyLock::new(|| table(&Kuva::Viridis, 0.0, 1.0));
+static VIRIDIS: LazyLock<ColorTable> = LazyLock::new(|| table(&Kuva::Viridis, 0.0, 1.0));
 // without its black, which is no colour of anything
-static INFERNO: LazyLock<Table> = LazyLock::new(|| table(&Kuva::Inferno, 0.15, 1.0));
+static INFERNO: LazyLock<ColorTable> = LazyLock::new(|| table(&Kuva::Inferno, 0.15, 1.0));
 // the scheme runs from red to blue; hot is positive
-static DIVERGING: LazyLock<Table> = LazyLock::new(|| table(&Kuva::RedBlue, 1.0, 0.0));
+static DIVERGING: LazyLock<ColorTable> = LazyLock::new(|| table(&Kuva::RedBlue, 1.0, 0.0));
 
 impl ColorMap {
     /// The colour at `share` between 0 and 1 (clamped); grey for NaN.
@@ -43,7 +43,7 @@ impl ColorMap {
 }
 
 /// A part of a scheme.
-fn table(map: &Kuva, from: f64, to: f64) -> Table {
+fn table(map: &Kuva, from: f64, to: f64) -> ColorTable {
     std::array::from_fn(|index| {
         // none only for custom maps
         map.map_rgb(from + (to - from) * index as f64 / 255.0).map_or(MISSING, |(r, g, b)| [r, g, b])

@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 
 use super::skin::{Corner, Plane, Skin};
-use crate::output::lattice::{Cells, NONE, joined, neighbours};
+use crate::output::lattice::{LatticeCells, NONE, joined, neighbours};
 
 /// Particles in space.
 #[derive(Clone, Copy, Debug)]
@@ -33,7 +33,7 @@ impl Particles<'_> {
         let next = neighbours(&self.reference[..count], self.spacing);
         let positions = &self.positions[..count];
         let joined = joined(positions, &next, self.spacing, self.bridge);
-        let cells = Cells { positions, joined: &joined, spacing: self.spacing, axes: 3 };
+        let cells = LatticeCells { positions, joined: &joined, spacing: self.spacing, axes: 3 };
         let loose = |k: usize| next[k] == [NONE; 6];
         let taken: HashSet<[i64; 3]> =
             (0..count).filter(|&k| loose(k) && !gone(k)).map(|k| self.cell(self.positions[k])).collect();

@@ -8,11 +8,11 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::axis::{labels, ticks};
-use super::bar::{Bar, LABEL, LINE, TICK, TICK_LENGTH};
-use super::blocks::Blocks;
-use super::canvas::{Anchor, BLACK, Canvas, Text};
+use super::bar::{ColorBar, LABEL, LINE, TICK, TICK_LENGTH};
+use super::blocks::ParticleBlocks;
+use super::canvas::{LabelAnchor, BLACK, Canvas, Text};
 use super::color::{ColorMap, MISSING};
-use super::particles::{Raster, Window};
+use super::particles::{Raster, PixelWindow};
 use super::picture_error;
 use polycore::Error;
 use polycore::file::atomic_write;
@@ -102,8 +102,8 @@ impl<'a> Panel<'a> {
         self
     }
 
-    fn outline(&self) -> Blocks {
-        Blocks::new(self.positions, self.reference, self.spacing, self.bridge)
+    fn outline(&self) -> ParticleBlocks {
+        ParticleBlocks::new(self.positions, self.reference, self.spacing, self.bridge)
     }
 
     /// Returns whether it shows the same particles in the same places.
@@ -237,13 +237,13 @@ impl<'a> FieldMap<'a> {
         }
         let mut drawn = Vec::with_capacity(self.panels.len());
         // panels of the same particles share their outlines
-        let mut last: Option<(&Panel<'_>, Arc<Blocks>)> = None;
+        let mut last: Option<(&Panel<'_>, Arc<ParticleBlocks>)> = None;
         for panels in self.panels.chunks(rayon::current_num_threads()) {
             let mut outlined = Vec::with_capacity(panels.len());
             for panel in panels {
                 panel.check()?;
                 let window =
-                    Window::around(panel.positions, panel.spacing, self.size as f64).ok_or_else(|| {
+                    PixelWindow::around(panel.positions, panel.spacing, self.size as f64).ok_or_else(|| {
                         format!("panel `{}`: positions are not finite or too far apart", panel.title)
                     })?;
                 let kept = last.take().filter(|(other, _)| panel.has_outline_of(other));
@@ -251,7 +251,7 @@ impl<'a> FieldMap<'a> {
                 outlined.push((panel, window, Arc::clone(&blocks)));
                 last = Some((panel, blocks));
             }
-            let draw = |(panel, window, blocks): (_, Window, Arc<Blocks>)| self.draw(panel, &window, &blocks);
+            let draw = |(panel, window, blocks): (_, PixelWindow, Arc<ParticleBlocks>)| self.draw(panel, &window, &blocks);
             drawn.extend(outlined.into_par_iter().map(draw).collect::<Result<Vec<Canvas>, String>>()?);
         }
         let columns = self.columns.unwrap_or(drawn.len()).min(drawn.len());
@@ -272,12 +272,12 @@ impl<'a> FieldMap<'a> {
         Ok(canvas)
     }
 
-    fn draw(&self, panel: &Panel<'_>, window: &Window, blocks: &Blocks) -> Result<Canvas, String> {
+    fn draw(&self, panel: &Panel<'_>, window: &PixelWindow, blocks: &ParticleBlocks) -> Result<Canvas, String> {
         let raster = window.draw(panel.positions, panel.values, blocks);
         let (low, high) = panel.limits();
         let beyond =
             [panel.values.iter().any(|value| *value < low), panel.values.iter().any(|value| *value > high)];
-        let bar = Bar::new(&panel.label, (low, high), beyond, raster.height.max(220))?;
+        let bar = ColorBar::new(&panel.label, (low, high), beyond, raster.height.max(220))?;
         let axes = self.lengths.as_ref().map(|lengths| Axes::new(window, &raster, lengths, self.names));
         let axes = axes.transpose()?;
         let title = Text::new(&panel.title, TITLE)?;
@@ -304,7 +304,7 @@ impl<'a> FieldMap<'a> {
             let middle = x + raster.width as isize / 2;
             let half = title.width as isize / 2;
             let middle = middle.clamp(half + 4, (width as isize - half - 4).max(half + 4));
-            canvas.text(middle, (MARGIN + TITLE as usize * 3 / 4) as isize, &title, Anchor::Center);
+            canvas.text(middle, (MARGIN + TITLE as usize * 3 / 4) as isize, &title, LabelAnchor::Center);
         }
         Ok(canvas)
     }
@@ -328,7 +328,7 @@ struct Axes {
 
 impl Axes {
     fn new(
-        window: &Window,
+        window: &PixelWindow,
         raster: &Raster,
         (unit, factor): &(String, f64),
         names: [&str; 2],
@@ -377,16 +377,16 @@ impl Axes {
         let base = y + height + LINE;
         for (at, text) in &self.ticks[0] {
             canvas.rectangle(x + at - LINE / 2, base, LINE, TICK_LENGTH, BLACK);
-            canvas.text(x + at, base + TICK_LENGTH + TICK as isize * 3 / 4 + 2, text, Anchor::Center);
+            canvas.text(x + at, base + TICK_LENGTH + TICK as isize * 3 / 4 + 2, text, LabelAnchor::Center);
         }
         for (at, text) in &self.ticks[1] {
             canvas.rectangle(x - LINE - TICK_LENGTH, y + at - LINE / 2, TICK_LENGTH, LINE, BLACK);
-            canvas.text(x - LINE - TICK_LENGTH - 6, y + at, text, Anchor::Right);
+            canvas.text(x - LINE - TICK_LENGTH - 6, y + at, text, LabelAnchor::Right);
         }
         let under = base + TICK_LENGTH + TICK as isize * 3 / 2 + LABEL as isize * 3 / 4 + 2;
-        canvas.text(x + width / 2, under, &self.names[0], Anchor::Center);
+        canvas.text(x + width / 2, under, &self.names[0], LabelAnchor::Center);
         let beside = x - self.left as isize + LABEL as isize * 3 / 4;
-        canvas.text(beside, y + height / 2, &self.names[1], Anchor::Upwards);
+        canvas.text(beside, y + height / 2, &self.names[1], LabelAnchor::Upwards);
     }
 }
 
@@ -398,7 +398,7 @@ mod tests {
     #[test]
     fn narrow_fields_have_ticks() {
         for (half, width) in [(9.0, 70), (10.5, 62), (10.5, 100), (40.0, 240), (0.9, 120), (1e5, 120)] {
-            let window = Window { low: [-half, 0.0], high: [half, half], scale: width as f64 / (2.0 * half) };
+            let window = PixelWindow { low: [-half, 0.0], high: [half, half], scale: width as f64 / (2.0 * half) };
             let raster = Raster { width, height: width / 2, values: Vec::new() };
             let axes = Axes::new(&window, &raster, &("mm".to_owned(), 1.0), ["x", "y"]).unwrap();
             let across = &axes.ticks[0];

@@ -44,11 +44,11 @@ pub enum LegendPlace {
 pub struct Series {
     pub(super) name: String,
     points: Vec<(f64, f64)>,
-    pub(super) style: Style,
+    pub(super) style: SeriesStyle,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Style {
+pub(super) enum SeriesStyle {
     Line,
     Markers,
     Both,
@@ -58,25 +58,25 @@ pub(super) enum Style {
 impl Series {
     /// Joined by a line. A NaN interrupts it.
     pub fn line(name: &str, x: &[f64], y: &[f64]) -> Self {
-        Self::new(name, x, y, Style::Line)
+        Self::new(name, x, y, SeriesStyle::Line)
     }
 
     /// Single points: measurements.
     pub fn markers(name: &str, x: &[f64], y: &[f64]) -> Self {
-        Self::new(name, x, y, Style::Markers)
+        Self::new(name, x, y, SeriesStyle::Markers)
     }
 
     /// Points joined by a line: convergence studies.
     pub fn marked_line(name: &str, x: &[f64], y: &[f64]) -> Self {
-        Self::new(name, x, y, Style::Both)
+        Self::new(name, x, y, SeriesStyle::Both)
     }
 
     /// A dashed black line: what the others are compared with.
     pub fn reference(name: &str, x: &[f64], y: &[f64]) -> Self {
-        Self::new(name, x, y, Style::Reference)
+        Self::new(name, x, y, SeriesStyle::Reference)
     }
 
-    fn new(name: &str, x: &[f64], y: &[f64], style: Style) -> Self {
+    fn new(name: &str, x: &[f64], y: &[f64], style: SeriesStyle) -> Self {
         // a missing partner is as undefined as a NaN
         let count = x.len().max(y.len());
         let at = |values: &[f64], index: usize| values.get(index).copied().unwrap_or(f64::NAN);

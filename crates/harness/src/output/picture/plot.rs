@@ -8,9 +8,9 @@ use kuva::backend::svg::SvgBackend;
 use kuva::render::color::Color;
 use kuva::render::render::{PathData, Primitive, Scene, TextAnchor};
 
-use super::axis::Axis;
-use super::canvas::{Anchor, Canvas, Text};
-use super::line::{LegendPlace, LinePlot, Style};
+use super::axis::PlotAxis;
+use super::canvas::{LabelAnchor, Canvas, Text};
+use super::line::{LegendPlace, LinePlot, SeriesStyle};
 use super::picture_error;
 use polycore::Error;
 use polycore::file::atomic_write;
@@ -78,7 +78,7 @@ impl LinePlot {
         // the raster back end turns letters pixel by pixel; a quarter turn of ours loses nothing
         let text = Text::new(&label.text, (f64::from(label.size) * PIXELS) as u32)?;
         let [x, y] = [label.x, label.y].map(|at| (at * PIXELS).round() as isize);
-        canvas.text(x, y, &text, Anchor::Upwards);
+        canvas.text(x, y, &text, LabelAnchor::Upwards);
         canvas.encode()
     }
 }
@@ -87,8 +87,8 @@ impl LinePlot {
 fn scene(plot: &LinePlot) -> Result<(Scene, UprightLabel), String> {
     let (width, height) = plot.size;
     let values = |pick: fn(&(f64, f64)) -> f64| plot.series.iter().flat_map(|s| s.runs()).flatten().map(pick);
-    let x = Axis::new(values(|point| point.0), plot.x_range, plot.log[0], (width / 90.0) as usize);
-    let y = Axis::new(values(|point| point.1), plot.y_range, plot.log[1], (height / 60.0) as usize);
+    let x = PlotAxis::new(values(|point| point.0), plot.x_range, plot.log[0], (width / 90.0) as usize);
+    let y = PlotAxis::new(values(|point| point.1), plot.y_range, plot.log[1], (height / 60.0) as usize);
     let mut legend = 0.0f64;
     for series in &plot.series {
         legend = legend.max(measure(&series.name, TICK)?);
@@ -141,8 +141,8 @@ struct Area {
     top: f64,
     right: f64,
     bottom: f64,
-    x: Axis,
-    y: Axis,
+    x: PlotAxis,
+    y: PlotAxis,
 }
 
 impl Area {
@@ -202,16 +202,16 @@ impl Area {
             for run in series.runs() {
                 let points: Vec<(f64, f64)> = run.iter().map(|point| self.place(*point)).collect();
                 match series.style {
-                    Style::Reference => {
+                    SeriesStyle::Reference => {
                         dashes(&points).into_iter().for_each(|dash| scene.add(polyline(dash, color, 1.4)));
                     }
-                    Style::Line | Style::Both if points.len() > 1 => {
+                    SeriesStyle::Line | SeriesStyle::Both if points.len() > 1 => {
                         scene.add(polyline(points.clone(), color, LINE))
                     }
                     _ => {}
                 }
                 // a single point has no line
-                if matches!(series.style, Style::Markers | Style::Both) || points.len() == 1 {
+                if matches!(series.style, SeriesStyle::Markers | SeriesStyle::Both) || points.len() == 1 {
                     points.iter().for_each(|point| scene.add(marker(*point, shape, color)));
                 }
             }
@@ -237,13 +237,13 @@ fn key(scene: &mut Scene, plot: &LinePlot, [x, y]: [f64; 2], [width, height]: [f
         let ends = vec![(x + PADDING, row), (x + PADDING + LEGEND_SAMPLE, row)];
         let middle = (x + PADDING + LEGEND_SAMPLE / 2.0, row);
         match series.style {
-            Style::Reference => {
+            SeriesStyle::Reference => {
                 dashes(&ends).into_iter().for_each(|dash| scene.add(polyline(dash, color, 1.4)))
             }
-            Style::Line | Style::Both => scene.add(polyline(ends, color, LINE)),
-            Style::Markers => {}
+            SeriesStyle::Line | SeriesStyle::Both => scene.add(polyline(ends, color, LINE)),
+            SeriesStyle::Markers => {}
         }
-        if matches!(series.style, Style::Markers | Style::Both) {
+        if matches!(series.style, SeriesStyle::Markers | SeriesStyle::Both) {
             scene.add(marker(middle, shape, color));
         }
         let base = row + 0.365 * f64::from(TICK);
@@ -254,8 +254,8 @@ fn key(scene: &mut Scene, plot: &LinePlot, [x, y]: [f64; 2], [width, height]: [f
 /// Colour and shape of each series; references are black and do not count.
 fn looks(plot: &LinePlot) -> Vec<(&'static str, usize)> {
     let mut colored = 0;
-    let look = |style: Style| {
-        if style == Style::Reference {
+    let look = |style: SeriesStyle| {
+        if style == SeriesStyle::Reference {
             return ("black", 0);
         }
         colored += 1;

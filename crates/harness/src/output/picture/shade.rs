@@ -1,7 +1,7 @@
 //! Rendering of faces: parallel projection, depth buffer, light and colour.
 
 use super::canvas::Canvas;
-use super::skin::{Face, Skin, cross, dot, minus};
+use super::skin::{SkinFace, Skin, cross, dot, minus};
 use super::strips::Strip;
 
 /// Samples along a pixel's side.
@@ -89,7 +89,7 @@ impl<'a> Sight<'a> {
         sight
     }
 
-    fn flat(&self, face: &Face) -> Flat {
+    fn flat(&self, face: &SkinFace) -> Flat {
         let corners = face.at.map(|x| self.camera.place(x));
         let normal = cross(minus(corners[2], corners[0]), minus(corners[3], corners[1]));
         // the visible side is the outside; y points down

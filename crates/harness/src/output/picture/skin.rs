@@ -31,12 +31,12 @@ pub struct View {
 #[derive(Clone, Debug, Default)]
 pub struct Skin {
     pub(super) cut: Option<Plane>,
-    pub(super) faces: Vec<Face>,
+    pub(super) faces: Vec<SkinFace>,
 }
 
 /// A triangle (its last corner twice) or a quadrilateral.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Face {
+pub(super) struct SkinFace {
     pub(super) at: [[f64; 3]; 4],
     pub(super) values: [[f32; 2]; 4],
     /// Bit k: from corner k to the next one runs an edge.
@@ -158,7 +158,7 @@ impl Skin {
             let four = [corners[0], corners[first], corners[first + 1], corners[last]];
             // inner sides of the fan are not edges, nor is the side of length 0 of a triangle
             let edges = [first == 1, true, last > first + 1, last == count - 1];
-            self.faces.push(Face {
+            self.faces.push(SkinFace {
                 at: four.map(|corner| corner.at),
                 values: four.map(|corner| corner.values.map(|value| value as f32)),
                 edges: (0..4).map(|k| u8::from(edges[k]) << k).sum(),

@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::Path;
 
 use super::axis::{labels, ticks};
-use super::canvas::{Anchor, BLACK, Canvas, Text};
+use super::canvas::{LabelAnchor, BLACK, Canvas, Text};
 use super::color::ColorMap;
 use super::picture_error;
 use polycore::Error;
@@ -208,15 +208,15 @@ impl Strips<'_> {
         let top = |stage: usize| (head + stage * row + line(TITLE)) as isize;
         if !self.title.is_empty() {
             let title = Text::new(&self.title, TITLE)?;
-            canvas.text(width as isize / 2, (MARGIN + line(TITLE) / 2) as isize, &title, Anchor::Center);
+            canvas.text(width as isize / 2, (MARGIN + line(TITLE) / 2) as isize, &title, LabelAnchor::Center);
         }
         for (stage, (title, _)) in stages.iter().enumerate() {
             let title = Text::new(title, TITLE)?;
-            canvas.text(at(0), top(stage) - line(TITLE) as isize / 2, &title, Anchor::Left);
+            canvas.text(at(0), top(stage) - line(TITLE) as isize / 2, &title, LabelAnchor::Left);
             for (place, text) in upwards.iter().zip(&upward_texts) {
                 let y = top(stage) + ((end(1) - place * self.unit.1) * scale).round() as isize;
                 canvas.rectangle(at(0) - LINE - TICK_LENGTH, y, TICK_LENGTH, LINE, BLACK);
-                canvas.text(at(0) - LINE - TICK_LENGTH - 4, y, text, Anchor::Right);
+                canvas.text(at(0) - LINE - TICK_LENGTH - 4, y, text, LabelAnchor::Right);
             }
             for column in 0..columns {
                 canvas.frame(at(column), top(stage), across as isize, up as isize, LINE, BLACK);
@@ -227,18 +227,18 @@ impl Strips<'_> {
         let name = Text::new(&format!("{} [{}]", self.axes[1], self.unit.0), TICK)?;
         if name.width <= head + stages.len() * row {
             let middle = ((top(0) + base) / 2).max((name.width / 2) as isize);
-            canvas.text((MARGIN + line(TICK) / 2) as isize, middle, &name, Anchor::Upwards);
+            canvas.text((MARGIN + line(TICK) / 2) as isize, middle, &name, LabelAnchor::Upwards);
         }
         let bar = base + (2 * line(TICK) + MARGIN) as isize;
         for (column, strip) in self.columns.iter().enumerate() {
             for (place, text) in rightwards.iter().zip(&rightward_texts) {
                 let x = at(column) + ((place * self.unit.1 - self.low[0]) * scale).round() as isize;
                 canvas.rectangle(x, base, LINE, TICK_LENGTH, BLACK);
-                canvas.text(x, base + TICK_LENGTH + line(TICK) as isize / 2, text, Anchor::Center);
+                canvas.text(x, base + TICK_LENGTH + line(TICK) as isize / 2, text, LabelAnchor::Center);
             }
             let name = Text::new(&format!("{} [{}]", self.axes[0], self.unit.0), TICK)?;
             let middle = at(column) + across as isize / 2;
-            canvas.text(middle, base + TICK_LENGTH + 3 * line(TICK) as isize / 2, &name, Anchor::Center);
+            canvas.text(middle, base + TICK_LENGTH + 3 * line(TICK) as isize / 2, &name, LabelAnchor::Center);
             canvas.frame(at(column), bar, across as isize, BAR as isize, LINE, BLACK);
             let (low, high) = strip.range;
             let marks = ticks(low, high, (across / 90).clamp(2, 8));
@@ -247,11 +247,11 @@ impl Strips<'_> {
                 let x = at(column) + (share * across as f64).round() as isize;
                 canvas.rectangle(x, bar + BAR as isize + LINE, LINE, TICK_LENGTH, BLACK);
                 let y = bar + BAR as isize + TICK_LENGTH + line(TICK) as isize / 2 + 2;
-                canvas.text(x, y, text, Anchor::Center);
+                canvas.text(x, y, text, LabelAnchor::Center);
             }
             let label = Text::new(&strip.label, TICK)?;
             let y = bar + BAR as isize + TICK_LENGTH + 3 * line(TICK) as isize / 2 + 2;
-            canvas.text(middle, y, &label, Anchor::Center);
+            canvas.text(middle, y, &label, LabelAnchor::Center);
         }
         let mut sheet = Sheet::of(&canvas);
         for column in 0..columns {

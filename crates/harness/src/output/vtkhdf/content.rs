@@ -1,6 +1,6 @@
 //! Content of a file: cells of a mesh, and a step.
 
-use super::packed::Rows;
+use super::packed::PackedRows;
 use polycore::Error;
 
 /// Cells of a mesh.
@@ -50,11 +50,11 @@ impl Cells {
 }
 
 /// A step: time, points where they move, arrays on points and on cells.
-pub struct Step<'a> {
+pub struct StepContent<'a> {
     pub time: f64,
-    pub points: Option<Rows<'a>>,
-    pub arrays: Vec<Rows<'a>>,
-    pub cell_arrays: Vec<Rows<'a>>,
+    pub points: Option<PackedRows<'a>>,
+    pub arrays: Vec<PackedRows<'a>>,
+    pub cell_arrays: Vec<PackedRows<'a>>,
     /// Arrays in the order of the layout.
     pub moments: Vec<f64>,
 }

@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::content::{Cells, Step};
-use super::packed::Table;
+use super::content::{Cells, StepContent};
+use super::packed::StoredTable;
 use super::read::{Series, read};
 use super::write::Writer;
 use super::{Layout, data_error, remove, temporary_name, whole_file};
@@ -13,7 +13,7 @@ use polycore::file::{parent, sync_directory};
 
 /// The frames of a series.
 #[derive(Debug)]
-pub struct Frames {
+pub struct FrameFiles {
     path: PathBuf,
     frames: PathBuf,
     steps: usize,
@@ -23,7 +23,7 @@ pub struct Frames {
     mesh: Option<(Vec<[f64; 3]>, Cells)>,
 }
 
-impl Frames {
+impl FrameFiles {
     /// A new series; removes what an earlier run left there.
     pub fn create(path: &Path, mesh: Option<(Vec<[f64; 3]>, Cells)>) -> Result<Self, Error> {
         let series = Self::new(path, mesh)?;
@@ -74,7 +74,7 @@ impl Frames {
     }
 
     /// Writes the next step as a complete file.
-    pub fn step(&mut self, layout: &Layout, step: Step<'_>) -> Result<(), Error> {
+    pub fn step(&mut self, layout: &Layout, step: StepContent<'_>) -> Result<(), Error> {
         self.check(layout, step.time)?;
         let target = self.frame(self.steps);
         whole_file(&target, |temporary| {
@@ -176,11 +176,11 @@ impl Frames {
 fn append(writer: &mut Writer, from: &Series, step: usize) -> Result<(), Error> {
     let layout = from.layout();
     let [points, arrays, cells] = writer.tables();
-    let all = |tables: &[Table], names: &[(String, usize)], kind| {
+    let all = |tables: &[StoredTable], names: &[(String, usize)], kind| {
         let rows = tables.iter().zip(names).map(|(table, (name, _))| from.packed(table, kind, name, step));
         rows.collect::<Result<Vec<_>, _>>()
     };
-    let copied = Step {
+    let copied = StepContent {
         time: from.times()[step],
         points: points.first().map(|table| from.packed(table, "", "Points", step)).transpose()?,
         arrays: all(arrays, &layout.arrays, "PointData")?,

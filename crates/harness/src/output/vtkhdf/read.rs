@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use rust_hdf5::{H5Dataset, H5File};
 
-use super::packed::{Rows, Table};
+use super::packed::{PackedRows, StoredTable};
 use super::{Cells, Layout, OF_THE_FORMAT, format_error};
 use polycore::Error;
 use polycore::hdf5::dataset as checked;
@@ -209,20 +209,20 @@ impl Series {
     /// An array at a step for a table of another file: packed as it is where both store it in the same way.
     pub(super) fn packed(
         &self,
-        table: &Table,
+        table: &StoredTable,
         kind: &str,
         name: &str,
         step: usize,
-    ) -> Result<Rows<'static>, Error> {
+    ) -> Result<PackedRows<'static>, Error> {
         if let Some(bytes) = table.same_of(&self.file, &format!("VTKHDF/{kind}/{name}"), step) {
-            return Ok(Rows::Packed(bytes));
+            return Ok(PackedRows::Packed(bytes));
         }
         let values = match kind {
             "PointData" => self.data(step, name),
             "CellData" => self.cell_data(step, name),
             _ => self.points(step).map(Vec::into_flattened),
         };
-        values.map(|values| Rows::Values(values.into()))
+        values.map(|values| PackedRows::Values(values.into()))
     }
 
     pub(super) fn layout(&self) -> Layout {
