@@ -1,4 +1,5 @@
-//! Text with values of reports: `{case > quantity > decimals}` or `{case > quantity > decimals > factor}`.
+//! Text with values of reports: `{case > quantity > decimals}` or `{case > quantity > decimals > factor}`; with `e2` instead
+//! of decimals in scientific notation.
 
 use miette::{Result, miette};
 
@@ -29,12 +30,18 @@ pub fn fill(text: &str, value: impl Fn(&str, &str) -> Option<f64>) -> Result<Str
         let [case, quantity, decimals, factor] =
             parts(inner).ok_or_else(|| miette!("`{inner}`: expected `case > quantity > decimals`"))?;
         let found = value(case, quantity).ok_or_else(|| miette!("{case} has no value `{quantity}`"))?;
-        let decimals: usize = decimals.parse().map_err(|_| miette!("`{inner}`: decimals"))?;
+        let (scientific, digits) = decimals.strip_prefix('e').map_or((false, decimals), |digits| (true, digits));
+        let digits: usize = digits.parse().map_err(|_| miette!("`{inner}`: decimals"))?;
         let factor: f64 = if factor.is_empty() { "1" } else { factor }
             .parse()
             .map_err(|_| miette!("`{inner}`: factor"))?;
         filled += before;
-        filled += &format!("{:.decimals$}", found * factor).replace('-', "−");
+        let number = found * factor;
+        filled += &if scientific {
+            format!("{number:.digits$e}")
+        } else {
+            format!("{number:.digits$}").replace('-', "−")
+        };
         rest = after;
     }
     Ok(filled + rest)
@@ -62,6 +69,7 @@ mod tests {
         assert_eq!(fill(text, value).expect("text"), "| −0.03 | −3.2 % |");
         let found: Vec<_> = placeholders(text).map(|[case, _, decimals, factor]| [case, decimals, factor]).collect();
         assert_eq!(found, [["plate", "2", ""], ["plate", "1", "100"]]);
+        assert_eq!(fill("{plate > peak[dx=1mm m=3] > e1}", value).expect("text"), "-3.2e-2");
         for wrong in ["{plate > none > 1}", "{plate}", "{plate > peak[dx=1mm m=3] > x}", "{"] {
             assert!(fill(wrong, value).is_err(), "{wrong}");
         }
