@@ -55,7 +55,7 @@ pub fn replace(text: &str, name: &str, filled: &str) -> Result<String> {
     let begin = format!("<!-- values: {name} -->\n");
     let (before, rest) = text.split_once(&begin).ok_or_else(|| miette!("missing `{}`", begin.trim_end()))?;
     let (_, after) = rest.split_once(END).ok_or_else(|| miette!("missing `{END}` after `{name}`"))?;
-    Ok(format!("{before}{begin}{}\n{END}{after}", filled.trim_end()))
+    Ok(format!("{before}{begin}\n{}\n\n{END}{after}", filled.trim()))
 }
 
 #[cfg(test)]
@@ -75,7 +75,7 @@ mod tests {
         }
         let page = "a\n<!-- values: t -->\nold\n<!-- end -->\nb\n";
         let new = replace(page, "t", "new\n").expect("text");
-        assert_eq!(new, "a\n<!-- values: t -->\nnew\n<!-- end -->\nb\n");
+        assert_eq!(new, "a\n<!-- values: t -->\n\nnew\n\n<!-- end -->\nb\n");
         assert_eq!(replace(&new, "t", "new").expect("text"), new);
         assert!(replace(page, "u", "").is_err());
     }
