@@ -10,6 +10,7 @@ mod dist;
 mod licences;
 mod outcome;
 mod pictures;
+mod prose;
 mod report;
 mod stamp;
 mod summary;

@@ -39,6 +39,7 @@ pub fn run(workspace: &Workspace) -> Result<bool> {
     }
     findings.extend(unused(workspace.root(), &files)?);
     findings.extend(crate::pictures::findings(workspace.root(), &files)?);
+    findings.extend(crate::prose::findings(workspace.root(), &files));
     for finding in &findings {
         print(&format!("{finding}\n"));
     }
