@@ -19,7 +19,8 @@ fn follow(name: &str, results: &[&str]) {
         let file = entry.unwrap().path();
         fs::copy(&file, folder.path().join(file.file_name().unwrap())).unwrap();
         if file.extension().is_some_and(|extension| extension == "toml") {
-            let marker = format!("<!-- file: {} -->", file.strip_prefix(workspace()).unwrap().display());
+            let path = file.strip_prefix(workspace()).unwrap().display().to_string().replace('\\', "/");
+            let marker = format!("<!-- file: {path} -->");
             assert!(text.contains(&marker), "{}: the page does not show it", file.display());
         }
     }

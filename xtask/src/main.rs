@@ -11,6 +11,7 @@ mod dist;
 mod licences;
 mod outcome;
 mod pictures;
+mod prose;
 mod report;
 mod stamp;
 mod summary;

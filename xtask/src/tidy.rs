@@ -45,6 +45,7 @@ pub fn run(workspace: &Repository) -> Result<bool> {
     findings.extend(unused_dependencies(workspace.root(), &files)?);
     findings.extend(words.findings());
     findings.extend(crate::pictures::findings(workspace.root(), &files)?);
+    findings.extend(crate::prose::findings(workspace.root(), &files));
     for finding in &findings {
         print(&format!("{finding}\n"));
     }

@@ -1,4 +1,5 @@
-//! Text with values of reports: `{case > quantity > decimals}` or `{case > quantity > decimals > factor}`.
+//! Text with values of reports: `{case > quantity > decimals}` or `{case > quantity > decimals > factor}`; with `e2` instead
+//! of decimals in scientific notation.
 
 use miette::{Result, miette};
 
@@ -29,12 +30,18 @@ pub fn fill(text: &str, value: impl Fn(&str, &str) -> Option<f64>) -> Result<Str
         let [case, quantity, decimals, factor] =
             parts(inner).ok_or_else(|| miette!("`{inner}`: expected `case > quantity > decimals`"))?;
         let found = value(case, quantity).ok_or_else(|| miette!("{case} has no value `{quantity}`"))?;
-        let decimals: usize = decimals.parse().map_err(|_| miette!("`{inner}`: decimals"))?;
+        let (scientific, digits) = decimals.strip_prefix('e').map_or((false, decimals), |digits| (true, digits));
+        let digits: usize = digits.parse().map_err(|_| miette!("`{inner}`: decimals"))?;
         let factor: f64 = if factor.is_empty() { "1" } else { factor }
             .parse()
             .map_err(|_| miette!("`{inner}`: factor"))?;
         filled += before;
-        filled += &format!("{:.decimals$}", found * factor).replace('-', "−");
+        let number = found * factor;
+        filled += &if scientific {
+            format!("{number:.digits$e}")
+        } else {
+            format!("{number:.digits$}").replace('-', "−")
+        };
         rest = after;
     }
     Ok(filled + rest)
@@ -48,7 +55,7 @@ pub fn replace(text: &str, name: &str, filled: &str) -> Result<String> {
     let begin = format!("<!-- values: {name} -->\n");
     let (before, rest) = text.split_once(&begin).ok_or_else(|| miette!("missing `{}`", begin.trim_end()))?;
     let (_, after) = rest.split_once(END).ok_or_else(|| miette!("missing `{END}` after `{name}`"))?;
-    Ok(format!("{before}{begin}{}\n{END}{after}", filled.trim_end()))
+    Ok(format!("{before}{begin}\n{}\n\n{END}{after}", filled.trim()))
 }
 
 #[cfg(test)]
@@ -62,12 +69,13 @@ mod tests {
         assert_eq!(fill(text, value).expect("text"), "| −0.03 | −3.2 % |");
         let found: Vec<_> = placeholders(text).map(|[case, _, decimals, factor]| [case, decimals, factor]).collect();
         assert_eq!(found, [["plate", "2", ""], ["plate", "1", "100"]]);
+        assert_eq!(fill("{plate > peak[dx=1mm m=3] > e1}", value).expect("text"), "-3.2e-2");
         for wrong in ["{plate > none > 1}", "{plate}", "{plate > peak[dx=1mm m=3] > x}", "{"] {
             assert!(fill(wrong, value).is_err(), "{wrong}");
         }
         let page = "a\n<!-- values: t -->\nold\n<!-- end -->\nb\n";
         let new = replace(page, "t", "new\n").expect("text");
-        assert_eq!(new, "a\n<!-- values: t -->\nnew\n<!-- end -->\nb\n");
+        assert_eq!(new, "a\n<!-- values: t -->\n\nnew\n\n<!-- end -->\nb\n");
         assert_eq!(replace(&new, "t", "new").expect("text"), new);
         assert!(replace(page, "u", "").is_err());
     }
