@@ -28,7 +28,7 @@ const MOST_SHARED: usize = 40;
 
 /// Findings by rule.
 #[derive(Default)]
-pub struct Words {
+pub struct WordCounts {
     /// Number of doc comments.
     comments: usize,
     pronouns: Vec<String>,
@@ -38,7 +38,7 @@ pub struct Words {
     types: BTreeMap<String, BTreeSet<String>>,
 }
 
-impl Words {
+impl WordCounts {
     /// Adds a source file of any crate.
     pub fn add(&mut self, file: &str, text: &str) {
         let mut in_tests = is_test(file);
@@ -171,8 +171,8 @@ fn type_name(item: &str) -> Option<&str> {
 mod tests {
     use super::*;
 
-    fn words(files: &[(&str, &str)]) -> Words {
-        let mut words = Words::default();
+    fn words(files: &[(&str, &str)]) -> WordCounts {
+        let mut words = WordCounts::default();
         files.iter().for_each(|(file, text)| words.add(file, text));
         words
     }
