@@ -4,17 +4,15 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Words with which a doc comment must not begin: the reader learns what an item is only later.
 const PRONOUNS: &str = "What Where Of Whether Its How Those That These This They It Which Who When As In By \
-                        From \
-                        With For At On To If So Into Whose Than Such There Here Thus Their One Both None Nothing \
-                        Everything";
+                        From With For At On To If So Into Whose Than Such There Here Thus Their One Both \
+                        None Nothing Everything";
 
 /// Largest share of doc comments that begin with such a word.
 const MOST_PRONOUNS: f64 = 0.01;
 
 /// Names that no public function has: prepositions, pronouns, auxiliaries, and words with several meanings.
 const WORDS: &str = "own one told said laid lay held hold holds meets look looks has have had does leap \
-                     still taken \
-                     part know spend may yes place round release sever slack taut its for";
+                     still taken part know spend may yes place round release sever slack taut its for";
 
 /// Names of one or two letters that are symbols of the field.
 const SYMBOLS: [(&str, &str); 2] =

@@ -178,7 +178,7 @@ fn bad_tables_are_refused_with_the_line() {
         ("stretch,nominal_MPa\n-2,1\n", "line 2: column 1, `stretch`: found `-2`"),
         ("stretch,nominal_MPa\n1,2,3\n", "3 cells"),
         ("mode,stretch,nominal_MPa\nsimple-shear,1,0\n", "found `simple-shear`; allowed: a test: `uniaxial`"),
-        ("stretch,nominal_MPa\n1,0\n", "no stress other than zero"),
+        ("stretch,nominal_MPa\n1,0\n", "a stress other than zero"),
         ("", "headings: found `an empty file`"),
         ("strain [mm],stress [MPa]\n1,0.1\n", "unit of column 1"),
         ("strain,true stress [MPa]\n0.1,0.1\n", "`strain = \"engineering\"` or"),
