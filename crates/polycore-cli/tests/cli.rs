@@ -205,9 +205,11 @@ fn trials_pass_and_fail() {
         ("[\"1 MPa\", 5.0625]", "[\"1 MPa\"]", "shear_modulus, J_m"),
         ("[\"1 MPa\", 5.0625]", "[1.0, 5.0625]", "without a unit"),
         ("[\"1 MPa\", 5.0625]", "[\"1 MPa\", \"5 MPa\"]", "with a unit"),
-        ("stretch = 2.0\nrefused", "refused", "no `stretch`"),
+        ("stretch = 2.0\nrefused", "refused", "missing `trial[0].stretch`"),
         ("name = \"strip\"", "name = \"locked\"", "a second time"),
-        ("data = [[2.0, \"1.75 MPa\"]]", "", "neither"),
+        ("data = [[2.0, \"1.75 MPa\"]]", "", "missing `trial[2].parameters`"),
+        ("data = [[", "parameters = [\"1 MPa\"]\ndata = [[", "`trial[2].data` conflicts with `parameters`"),
+        ("data = [[", "stretch = 2.0\ndata = [[", "unexpected `trial[2].stretch`"),
         ("mode = \"pure-shear\"", "mode = \"shear\"", "allowed: `uniaxial`, `equibiaxial`, `pure-shear`"),
         ("\"strip.nominal\"", "\"strip.stress\"", "found `strip.stress`; allowed: "),
     ] {
