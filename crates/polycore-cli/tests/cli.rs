@@ -306,7 +306,7 @@ fn ordinary_tables_give_every_law() {
         let materials = std::fs::read_to_string(folder.path().join("out/materials.toml")).unwrap();
         assert!(materials.contains(written), "{materials}");
         assert!(
-            materials.contains("# mooney-rivlin, rms") && materials.contains("take `neo-hookean`"),
+            materials.contains("# mooney-rivlin, rms") && materials.contains("use `neo-hookean`"),
             "{materials}"
         );
         let fits = std::fs::read_to_string(folder.path().join("out/fits.csv")).unwrap();
@@ -403,7 +403,7 @@ fn cross_ends_in_a_verdict() {
 #[test]
 fn laws_of_other_names_get_advice() {
     for (name, advice) in [
-        ("arruda-boyce", "`eight-chain`: that is Arruda and Boyce's law"),
+        ("arruda-boyce", "`eight-chain`, the law of Arruda and Boyce"),
         ("reduced-polynomial", "`yeoh`"),
         ("prony", "rates and relaxation are not modelled"),
         ("poisson_ratio", "incompressible"),
