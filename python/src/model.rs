@@ -54,7 +54,7 @@ pub struct SimulationSpec {
 
 /// Solution method with its settings.
 #[derive(Clone, Copy)]
-enum SolverChoice {
+enum SolutionMethod {
     Lbfgs(Lbfgs),
     Relaxation(DynamicRelaxation),
     Verlet(VelocityVerlet),
@@ -63,7 +63,7 @@ enum SolverChoice {
 /// Body in the plane or in space.
 trait AnyBody: Send + Sync {
     fn dimension(&self) -> usize;
-    fn solve(&mut self, method: SolverChoice, line: &RunLink<'_>) -> Result<(), Error>;
+    fn solve(&mut self, method: SolutionMethod, line: &RunLink<'_>) -> Result<(), Error>;
     fn positions(&self) -> Vec<f64>;
     fn displacements(&self) -> Vec<f64>;
     fn set_velocity(&mut self, velocity: &[f64]);
@@ -85,7 +85,7 @@ impl<const D: usize> AnyBody for BondSimulation<D> {
         D
     }
 
-    fn solve(&mut self, method: SolverChoice, line: &RunLink<'_>) -> Result<(), Error> {
+    fn solve(&mut self, method: SolutionMethod, line: &RunLink<'_>) -> Result<(), Error> {
         let sites: Vec<usize> = self.bonds.particles().iter().map(|&site| site as usize).collect();
         let positions = line.wants_steps().then(|| self.positions());
         let watch =
@@ -104,9 +104,9 @@ impl<const D: usize> AnyBody for BondSimulation<D> {
             if line.step(step) { Ok(()) } else { Err(interruption()) }
         };
         match method {
-            SolverChoice::Lbfgs(method) => self.solve_watched(method, watch, finished),
-            SolverChoice::Relaxation(method) => self.solve_watched(method, watch, finished),
-            SolverChoice::Verlet(method) => self.solve_watched(method, watch, finished),
+            SolutionMethod::Lbfgs(method) => self.solve_watched(method, watch, finished),
+            SolutionMethod::Relaxation(method) => self.solve_watched(method, watch, finished),
+            SolutionMethod::Verlet(method) => self.solve_watched(method, watch, finished),
         }
     }
 
@@ -417,12 +417,12 @@ impl InSpace for Body<3> {
 }
 
 /// Creates a method from its name and some of its settings.
-fn parse_method(name: &str, mut settings: HashMap<String, f64>) -> PyResult<SolverChoice> {
+fn parse_method(name: &str, mut settings: HashMap<String, f64>) -> PyResult<SolutionMethod> {
     let mut take = |name: &str, default: f64| settings.remove(name).unwrap_or(default);
     let method = match name {
         "lbfgs" => {
             let own = Lbfgs::default();
-            SolverChoice::Lbfgs(Lbfgs {
+            SolutionMethod::Lbfgs(Lbfgs {
                 tolerance: take("tolerance", 1e-4),
                 max_iterations: take("max_iterations", own.max_iterations as f64) as u64,
                 accept: take("accept", own.accept),
@@ -431,7 +431,7 @@ fn parse_method(name: &str, mut settings: HashMap<String, f64>) -> PyResult<Solv
         }
         "relaxation" => {
             let own = DynamicRelaxation::default();
-            SolverChoice::Relaxation(DynamicRelaxation {
+            SolutionMethod::Relaxation(DynamicRelaxation {
                 tolerance: take("tolerance", own.tolerance),
                 max_iterations: take("max_iterations", own.max_iterations as f64) as u64,
                 accept: take("accept", own.accept),
@@ -440,7 +440,7 @@ fn parse_method(name: &str, mut settings: HashMap<String, f64>) -> PyResult<Solv
         }
         "verlet" => {
             let step = take("time_step", 0.0);
-            SolverChoice::Verlet(VelocityVerlet {
+            SolutionMethod::Verlet(VelocityVerlet {
                 density: take("density", 1000.0),
                 time_step: (step > 0.0).then_some(step),
                 safety: take("safety", 0.8),

@@ -21,7 +21,7 @@ const MOST_BYTES: u64 = 1_000_000;
 pub fn run(workspace: &Repository) -> Result<bool> {
     let files = tracked(workspace.root())?;
     let mut findings = Vec::new();
-    let mut words = words::Words::default();
+    let mut words = words::WordCounts::default();
     for file in &files {
         let path = workspace.root().join(file);
         // a file deleted but not yet committed is still listed

@@ -210,9 +210,11 @@ fn trials_pass_and_fail() {
         ("[\"1 MPa\", 5.0625]", "[\"1 MPa\"]", "shear_modulus, J_m"),
         ("[\"1 MPa\", 5.0625]", "[1.0, 5.0625]", "without a unit"),
         ("[\"1 MPa\", 5.0625]", "[\"1 MPa\", \"5 MPa\"]", "with a unit"),
-        ("stretch = 2.0\nrefused", "refused", "no `stretch`"),
+        ("stretch = 2.0\nrefused", "refused", "missing `trial[0].stretch`"),
         ("name = \"strip\"", "name = \"locked\"", "a second time"),
-        ("data = [[2.0, \"1.75 MPa\"]]", "", "neither"),
+        ("data = [[2.0, \"1.75 MPa\"]]", "", "missing `trial[2].parameters`"),
+        ("data = [[", "parameters = [\"1 MPa\"]\ndata = [[", "`trial[2].data` conflicts with `parameters`"),
+        ("data = [[", "stretch = 2.0\ndata = [[", "unexpected `trial[2].stretch`"),
         ("mode = \"pure-shear\"", "mode = \"shear\"", "allowed: `uniaxial`, `equibiaxial`, `pure-shear`"),
         ("\"strip.nominal\"", "\"strip.stress\"", "found `strip.stress`; allowed: "),
     ] {
@@ -309,7 +311,7 @@ fn ordinary_tables_give_every_law() {
         let materials = std::fs::read_to_string(folder.path().join("out/materials.toml")).unwrap();
         assert!(materials.contains(written), "{materials}");
         assert!(
-            materials.contains("# mooney-rivlin, rms") && materials.contains("take `neo-hookean`"),
+            materials.contains("# mooney-rivlin, rms") && materials.contains("use `neo-hookean`"),
             "{materials}"
         );
         let fits = std::fs::read_to_string(folder.path().join("out/fits.csv")).unwrap();
@@ -346,7 +348,7 @@ fn tables_of_laboratories() {
     for part in [
         "separator `;`, decimal comma, UTF-8, headings in line 1, columns `Test`, `Strain (%)`, `Stress \
          (MPa)`",
-        "engineering strain and nominal stress (the headings do not say which; keys `strain` and `stress`)",
+        "engineering strain and nominal stress (assumed; the keys `strain` and `stress` set them)",
         "stretches 1.0000 to 2.0000",
     ] {
         assert!(shown.contains(part), "{shown}");
@@ -406,7 +408,7 @@ fn cross_ends_in_a_verdict() {
 #[test]
 fn laws_of_other_names_get_advice() {
     for (name, advice) in [
-        ("arruda-boyce", "`eight-chain`: that is Arruda and Boyce's law"),
+        ("arruda-boyce", "`eight-chain`, the law of Arruda and Boyce"),
         ("reduced-polynomial", "`yeoh`"),
         ("prony", "rates and relaxation are not modelled"),
         ("poisson_ratio", "incompressible"),

@@ -3,7 +3,7 @@
 use crate::Error;
 use crystfem::mechanics::SolidifyingMaxwell;
 use polycore::tensor::voigt::{Voigt, Voigt6x6};
-use umatht::{State, ThermalIncrement, respond};
+use umatht::{HeatIncrement, State, respond};
 
 /// PA12 that crystallizes, shrinks and relaxes ([`SolidifyingMaxwell::pa12`]); it integrates α from the
 /// temperatures of the host. Strains are small.
@@ -64,7 +64,7 @@ impl Print {
     }
 
     fn degree(&self, state: &State, from: f64, to: f64, time: f64) -> Result<State, Error> {
-        let at = ThermalIncrement { temperature: from, change: to - from, time, gradient: [0.0; 3] };
+        let at = HeatIncrement { temperature: from, change: to - from, time, gradient: [0.0; 3] };
         let answer = respond(&self.thermal, &at, state);
         Ok(answer.map_err(|error| Error::new(error.name, error.found, error.allowed))?.state)
     }

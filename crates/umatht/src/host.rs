@@ -1,6 +1,6 @@
 //! Symbols that hosts call.
 
-use crate::{NAMES, State, ThermalIncrement, ThermalResponse, file, respond};
+use crate::{HeatIncrement, HeatResponse, NAMES, State, file, respond};
 use std::ffi::{CStr, c_char, c_int};
 use std::path::Path;
 
@@ -60,7 +60,7 @@ pub unsafe extern "C" fn umatht_(
         abort(&format!("umatht: NSTATV: found {}; allowed: 3 or more (*DEPVAR)", states.len()));
     }
     let directions = gradient.len();
-    let mut at = ThermalIncrement { temperature, change, time, gradient: [0.0; 3] };
+    let mut at = HeatIncrement { temperature, change, time, gradient: [0.0; 3] };
     at.gradient[..directions].copy_from_slice(gradient);
     let state = State { z: states[0], degree: states[1], temperature: states[2] };
     let whole;
@@ -116,12 +116,12 @@ pub unsafe extern "C" fn crystfem_respond(
     count: usize,
     at: *const [f64; 6],
     state: *const State,
-    answer: *mut ThermalResponse,
+    answer: *mut HeatResponse,
 ) -> c_int {
     // SAFETY: the caller's promise
     let (constants, [temperature, change, time, gradient @ ..], state) =
         unsafe { (std::slice::from_raw_parts(constants, count), *at, &*state) };
-    match respond(constants, &ThermalIncrement { temperature, change, time, gradient }, state) {
+    match respond(constants, &HeatIncrement { temperature, change, time, gradient }, state) {
         Ok(found) => {
             // SAFETY: the caller's promise
             unsafe { answer.write(found) };

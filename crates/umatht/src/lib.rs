@@ -5,12 +5,12 @@
 //! host keeps the state; an increment that it repeats or cuts back gets the same response.
 //!
 //! ```
-//! use umatht::{ThermalIncrement, NAMES, State, respond};
+//! use umatht::{HeatIncrement, NAMES, State, respond};
 //!
 //! // k, c, ΔH·X∞, column of Table 4.1; 1 s of cooling from 150 °C at 10 K/min
 //! let constants = [0.25, 2200.0, 0.0, 1.0];
 //! let (change, gradient) = (-10.0 / 60.0, [100.0, 0.0, 0.0]);
-//! let at = ThermalIncrement { temperature: 423.15, change, time: 1.0, gradient };
+//! let at = HeatIncrement { temperature: 423.15, change, time: 1.0, gradient };
 //! let answer = respond(&constants, &at, &State::default())?;
 //! assert!(answer.state.degree > 0.0 && answer.flux[0] == -25.0);
 //! assert_eq!(NAMES[3], "kinetics");
@@ -29,7 +29,7 @@ use nalgebra::Vector3;
 
 /// Increment at an integration point, in the units of the host: time in s, temperature from its own zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ThermalIncrement {
+pub struct HeatIncrement {
     /// Temperature at the start.
     pub temperature: f64,
     /// Change over the increment.
@@ -55,7 +55,7 @@ pub struct State {
 /// Response of the material at the end of an increment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
-pub struct ThermalResponse {
+pub struct HeatResponse {
     /// State at the end.
     pub state: State,
     /// Change of internal energy per mass over the increment.
@@ -74,11 +74,11 @@ pub struct ThermalResponse {
 ///
 /// # Errors
 /// [`Error`]: a constant out of range, a temperature that is not finite or below 0 K.
-pub fn respond(constants: &[f64], at: &ThermalIncrement, state: &State) -> Result<ThermalResponse, Error> {
+pub fn respond(constants: &[f64], at: &HeatIncrement, state: &State) -> Result<HeatResponse, Error> {
     constants::with_material(constants, |constants| answer(constants, at, state))?
 }
 
-fn answer(constants: &HostMaterial, at: &ThermalIncrement, state: &State) -> Result<ThermalResponse, Error> {
+fn answer(constants: &HostMaterial, at: &HeatIncrement, state: &State) -> Result<HeatResponse, Error> {
     let HostMaterial { material, absolute_zero, calculix } = constants;
     let end = at.temperature + at.change + absolute_zero;
     // CalculiX passes the last iterate for the temperature at the start
@@ -101,7 +101,7 @@ fn answer(constants: &HostMaterial, at: &ThermalIncrement, state: &State) -> Res
         conductivity[k] = sign * entry;
     }
     let flux: Vector3<f64> = response.flux;
-    Ok(ThermalResponse {
+    Ok(HeatResponse {
         state: State { z: new[0], degree: fields[0], temperature: end },
         energy: response.energy - material.energy(start, &old),
         slope: response.d_energy_d_temperature,
@@ -115,8 +115,8 @@ fn answer(constants: &HostMaterial, at: &ThermalIncrement, state: &State) -> Res
 mod tests {
     use super::*;
 
-    fn at(temperature: f64, change: f64) -> ThermalIncrement {
-        ThermalIncrement { temperature, change, time: 1.0, gradient: [1.0, 2.0, 3.0] }
+    fn at(temperature: f64, change: f64) -> HeatIncrement {
+        HeatIncrement { temperature, change, time: 1.0, gradient: [1.0, 2.0, 3.0] }
     }
 
     /// Constants with own kinetics: those of column 1, with a melting point of 500 K.
@@ -142,7 +142,7 @@ mod tests {
     /// remain, or never melt.
     #[test]
     fn melting_belongs_to_the_constants() {
-        let hot = ThermalIncrement { gradient: [0.0; 3], ..at(440.0, 20.0) };
+        let hot = HeatIncrement { gradient: [0.0; 3], ..at(440.0, 20.0) };
         let state = State { z: 2.0, ..State::default() };
         let degree = |constants: &[f64]| respond(constants, &hot, &state).unwrap().state.degree;
         let pa12 = degree(&[0.25, 2200.0, 0.0, 1.0]);
@@ -182,7 +182,7 @@ mod tests {
         let energy = |change: f64| respond(&constants, &at(430.0, change), &state).unwrap();
         let slope = (energy(-9.99).energy - energy(-10.01).energy) / 0.02;
         assert!((slope / energy(-10.0).slope - 1.0).abs() < 1e-5, "{slope}");
-        let still = respond(&constants, &ThermalIncrement { time: 0.0, ..at(430.0, 0.0) }, &state).unwrap();
+        let still = respond(&constants, &HeatIncrement { time: 0.0, ..at(430.0, 0.0) }, &state).unwrap();
         assert_eq!((still.energy, still.state.z), (0.0, 0.5));
     }
 

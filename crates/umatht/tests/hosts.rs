@@ -39,8 +39,7 @@ fn answers_in_c() {
     std::fs::write(&file, C).unwrap();
     let text = run(&mut Command::new(link("gcc", &[&file], directory.path())));
     let mut numbers = text.split_whitespace().map(|word| word.parse::<f64>().unwrap());
-    let at =
-        umatht::ThermalIncrement { temperature: 150.0, change: -2.0, time: 3.0, gradient: [1.0, 2.0, 3.0] };
+    let at = umatht::HeatIncrement { temperature: 150.0, change: -2.0, time: 3.0, gradient: [1.0, 2.0, 3.0] };
     let state = umatht::State { z: 0.2, ..Default::default() };
     let own = umatht::respond(&[0.25, 2200.0, 52e3, 1.0, 273.15], &at, &state).unwrap();
     for expected in

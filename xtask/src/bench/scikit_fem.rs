@@ -51,8 +51,7 @@ impl ScikitFem {
         let folder = folder.display();
         Ok(Err(format!(
             "none in {folder} (python3 -m venv {folder} && {folder}/bin/pip install scikit-fem scipy; \
-             {VARIABLE} \
-             names another virtual environment)"
+             {VARIABLE} names another virtual environment)"
         )))
     }
 

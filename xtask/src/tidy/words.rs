@@ -4,17 +4,15 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Words with which a doc comment must not begin: the reader learns what an item is only later.
 const PRONOUNS: &str = "What Where Of Whether Its How Those That These This They It Which Who When As In By \
-                        From \
-                        With For At On To If So Into Whose Than Such There Here Thus Their One Both None Nothing \
-                        Everything";
+                        From With For At On To If So Into Whose Than Such There Here Thus Their One Both \
+                        None Nothing Everything";
 
 /// Largest share of doc comments that begin with such a word.
 const MOST_PRONOUNS: f64 = 0.01;
 
 /// Names that no public function has: prepositions, pronouns, auxiliaries, and words with several meanings.
 const WORDS: &str = "own one told said laid lay held hold holds meets look looks has have had does leap \
-                     still taken \
-                     part know spend may yes place round release sever slack taut its for";
+                     still taken part know spend may yes place round release sever slack taut its for";
 
 /// Names of one or two letters that are symbols of the field.
 const SYMBOLS: [(&str, &str); 2] =
@@ -28,7 +26,7 @@ const MOST_SHARED: usize = 40;
 
 /// Findings by rule.
 #[derive(Default)]
-pub struct Words {
+pub struct WordCounts {
     /// Number of doc comments.
     comments: usize,
     pronouns: Vec<String>,
@@ -38,7 +36,7 @@ pub struct Words {
     types: BTreeMap<String, BTreeSet<String>>,
 }
 
-impl Words {
+impl WordCounts {
     /// Adds a source file of any crate.
     pub fn add(&mut self, file: &str, text: &str) {
         let mut in_tests = is_test(file);
@@ -171,8 +169,8 @@ fn type_name(item: &str) -> Option<&str> {
 mod tests {
     use super::*;
 
-    fn words(files: &[(&str, &str)]) -> Words {
-        let mut words = Words::default();
+    fn words(files: &[(&str, &str)]) -> WordCounts {
+        let mut words = WordCounts::default();
         files.iter().for_each(|(file, text)| words.add(file, text));
         words
     }

@@ -7,7 +7,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
 use harness::report::{FILE_NAME, Report};
-use harness::scene::SourceStamp;
+use harness::scene::Stamp;
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
 use polycore::file::atomic_write;
 use serde::{Deserialize, Serialize};
@@ -127,7 +127,7 @@ fn fingerprint(settings: &Settings, case: &CaseFile, executable: &Path) -> std::
     let mut hasher = DefaultHasher::new();
     (fs::read(&case.file)?, settings.quick).hash(&mut hasher);
     for input in case.inputs() {
-        SourceStamp::identity_of(&settings.results(case, &input)).hash(&mut hasher);
+        Stamp::identity_of(&settings.results(case, &input)).hash(&mut hasher);
     }
     let changed = |path: &Path| {
         let metadata = fs::metadata(path)?;

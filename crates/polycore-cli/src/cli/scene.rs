@@ -184,8 +184,7 @@ impl FitCase {
         let _ = writeln!(
             text,
             "{} fits, {} trials, {} expectations; writes fits.csv, <data>_states.csv, materials.toml, \
-             pictures \
-             (not with --quick), report.json",
+             pictures (not with --quick), report.json",
             self.laws.len() * self.data.len(),
             self.trials.len(),
             self.expect.len()

@@ -92,9 +92,8 @@ pub(super) fn affine(unit: &str) -> Option<(f64, f64)> {
 
 /// The nearest known symbol, for "did you mean".
 pub(super) fn nearest(text: &str) -> Option<String> {
-    const COMMON_UNITS: &str = "m mm cm km nm µm kg g mg t s ms min h d K degC N kN mN MN Pa kPa MPa GPa bar kbar \
-                         atm J kJ mJ MJ W mW kW \
-                         Hz kHz L mL rad deg % mol A cal eV";
+    const COMMON_UNITS: &str = "m mm cm km nm µm kg g mg t s ms min h d K degC N kN mN MN Pa kPa MPa GPa bar \
+                         kbar atm J kJ mJ MJ W mW kW Hz kHz L mL rad deg % mol A cal eV";
     let names = [
         ("celsius", "degC"),
         ("kelvin", "K"),

@@ -227,9 +227,8 @@ pub fn neo_hookean_modulus(table: &TestData) -> Result<f64, Error> {
         return Ok(modulus);
     }
     let reason = format!(
-        "the data have a mean stiffness of {modulus:.6e} Pa, which must be positive: in tension (stretch \
-         above 1) stresses are \
-         positive, in compression negative; and a stretch is 1 at rest, a strain 0"
+        "the mean stiffness of the data is {modulus:.6e} Pa, but must be positive: in tension (stretch \
+         above 1) stresses are positive, in compression negative; and a stretch is 1 at rest, a strain 0"
     );
     Err(Error::Data { what: "fit".to_owned(), reason })
 }

@@ -42,13 +42,12 @@ pub(super) fn plausible(
     let strain = measure != StrainMeasure::Stretch;
     let far = rows.iter().find(|row| strain && !has_unit && row.written[0].abs() > LARGEST_STRAIN);
     if let Some(row) = far {
-        let allowed = "a strain below 20, that is 2000 %; in per cent the heading is `strain [%]`";
+        let allowed = "a strain below 20, i.e. 2000 %; for per cent use the heading `strain [%]`";
         return Err((row.index, allowed.to_owned()));
     }
-    if strain && !said && !has_unit && called_strain(rows, largest) {
-        let allowed = "a strain, 0 at rest; these are 1 where the stress is 0: is this a stretch? Head it \
-                       `stretch`, or write \
-                       `strain = \"stretch\"`";
+    if strain && !said && !has_unit && look_like_stretches(rows, largest) {
+        let allowed = "a strain, 0 at rest; these are 1 at zero stress: is this a stretch? Use the heading \
+                       `stretch`, or write `strain = \"stretch\"`";
         return Err((rows[0].index, allowed.to_owned()));
     }
     let counts = |row: &&TestRow| {
@@ -65,30 +64,29 @@ pub(super) fn plausible(
         let rising = slope(&measured) > 0.0;
         if squeezed && !(measure == StrainMeasure::Stretch && rising) {
             rows.iter_mut().for_each(|row| row.nominal[0] = 0.0 - row.nominal[0]);
-            notes.push("stresses of compression, positive in the file, are taken as negative".to_owned());
+            notes.push("stresses in compression, positive in the file, become negative".to_owned());
         } else if measure == StrainMeasure::Stretch && against.iter().all(|row| positive(row)) {
-            let allowed = "a stretch, 1 at rest, whose stress is negative below 1; is this a strain? Head \
-                           it `strain`, or write \
-                           `strain = \"engineering\"`";
+            let allowed = "a stretch, 1 at rest, whose stress is negative below 1; is this a strain? Use \
+                           the heading \
+                           `strain`, or write `strain = \"engineering\"`";
             return Err((row.index, allowed.to_owned()));
         } else {
             let (stress, stretch) = (row.nominal[0], row.stretches[0]);
             let allowed = format!(
-                "a stress of the sign of the strain (the stiffness would be negative: {stress} Pa at the \
-                 stretch {stretch}); in \
-                 compression both are negative"
+                "a stress with the sign of the strain (the stiffness would be negative: {stress} Pa at the \
+                 stretch {stretch}); in compression both are negative"
             );
             return Err((row.index, allowed));
         }
     }
     for mode in Mode::TESTS {
-        leave_out_tails(rows, notes, mode);
+        remove_tails(rows, notes, mode);
     }
     Ok(())
 }
 
 /// Returns true if the strains look like stretches: around 1 the stress is about 0, and none is near 0.
-fn called_strain(rows: &[TestRow], largest: f64) -> bool {
+fn look_like_stretches(rows: &[TestRow], largest: f64) -> bool {
     let at_rest =
         |row: &TestRow| (row.written[0] - 1.0).abs() < 0.02 && row.nominal[0].abs() <= NOISE_LEVEL * largest;
     rows.iter().any(at_rest)
@@ -106,7 +104,7 @@ fn slope(rows: &[TestRow]) -> f64 {
 
 /// Removes rows after the largest stress of each specimen in tension, if the stress falls and the specimen is
 /// not unloaded.
-fn leave_out_tails(rows: &mut Vec<TestRow>, notes: &mut Vec<String>, mode: Mode) {
+fn remove_tails(rows: &mut Vec<TestRow>, notes: &mut Vec<String>, mode: Mode) {
     let places: Vec<usize> = (0..rows.len()).filter(|&i| rows[i].mode == mode).collect();
     let strain = |i: usize| rows[i].stretches[0] - 1.0;
     let mut lost = Vec::new();
@@ -139,8 +137,7 @@ fn leave_out_tails(rows: &mut Vec<TestRow>, notes: &mut Vec<String>, mode: Mode)
     if let (Some(first), count) = (lost.first(), lost.len()) {
         notes.push(format!(
             "{count} rows after the largest stress are left out, from the stretch {:.4} on: the stress \
-             falls, as where a specimen \
-             breaks",
+             falls as in a broken specimen",
             rows[*first].stretches[0]
         ));
     }

@@ -83,7 +83,8 @@ impl PrincipalResponse {
             let slope = if (x - y).abs() > NEAR_EQUAL * room(x.max(y)) {
                 (stress[i] - stress[j]) / (x - y)
             } else {
-                // mean of dS/dλ over [y, x]; the error of the rule is NEAR_EQUAL⁶ relative, far below rounding
+                // mean of dS/dλ over [y, x]; the error of the rule is NEAR_EQUAL⁶ relative, far below
+                // rounding
                 GAUSS
                     .iter()
                     .map(|(at, weight)| {

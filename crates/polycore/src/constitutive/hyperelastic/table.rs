@@ -107,8 +107,8 @@ struct TestColumns {
 }
 
 const LAYOUTS: &str = "a strain (`stretch`, `strain [%]`) and a stress (`nominal [MPa]`), with a `mode` in \
-                       each row if there are \
-                       several tests, or `stretch_1`, `stretch_2`, `nominal_1 [MPa]`, `nominal_2 [MPa]`";
+                       each row if there are several tests, or `stretch_1`, `stretch_2`, `nominal_1 [MPa]`, \
+                       `nominal_2 [MPa]`";
 
 impl TestColumns {
     fn find(file: &table::Table, format: &TestFormat) -> Result<Self, table::Error> {
@@ -136,8 +136,7 @@ impl TestColumns {
             (place(0, &|what| stress(what).is_some()), place(1, &|what| strain(what).is_some()));
         if biaxial && stress_1.zip(strain_2).is_some_and(|(stress, strain)| stress < strain) {
             let allowed = "`strain_column` and `stress_column` in the data's entry, if these are specimens \
-                           side by side (an entry \
-                           each); of a biaxial test both strains before both stresses";
+                           side by side (an entry each); for a biaxial test both strains before both stresses";
             return Err(file.refuse_headings(allowed));
         }
         let axes = if biaxial { vec![Some(0), Some(1)] } else { vec![None] };
@@ -217,7 +216,7 @@ impl TestColumns {
                         file.layout().heading_line,
                         &what,
                         found,
-                        &format!("a strain, in % or without unit; {error}"),
+                        &format!("a strain, in % or without a unit; {error}"),
                     )
                 },
             )
@@ -257,7 +256,7 @@ impl TestColumns {
         if blank > 0 {
             notes.push(format!("{blank} rows without a stress are left out"));
         }
-        self.turn(&mut rows, &mut notes);
+        self.make_compression_negative(&mut rows, &mut notes);
         for row in &mut rows {
             for (axis, chosen) in self.strains.iter().enumerate() {
                 let written = row.written[axis];
@@ -267,7 +266,8 @@ impl TestColumns {
                     StrainMeasure::True => written.exp(),
                 };
                 if !(stretch > 0.0 && stretch.is_finite()) {
-                    let strain = "a stretch above 0; if this is a strain, head it `strain` or write `strain \
+                    let strain = "a stretch above 0; if this is a strain, use the heading `strain` or \
+                                  `strain \
                                   = \"engineering\"`";
                     let allowed = if chosen.measure == StrainMeasure::Stretch {
                         strain
@@ -300,12 +300,7 @@ impl TestColumns {
         let table = TestData { source, states: rows.iter().map(state).collect() };
         if table.measurements() == 0 {
             let found = format!("{} rows", file.rows());
-            return Err(file.refuse(
-                0,
-                "table",
-                found,
-                "at least one row; it contains no stress other than zero",
-            ));
+            return Err(file.refuse(0, "table", found, "at least one row with a stress other than zero"));
         }
         Ok(ImportedTest { description: self.describe(file, &table), table, notes })
     }
@@ -328,7 +323,7 @@ impl TestColumns {
     }
 
     /// Makes strains and stresses negative that headings or tests call compressive.
-    fn turn(&self, rows: &mut [TestRow], notes: &mut Vec<String>) {
+    fn make_compression_negative(&self, rows: &mut [TestRow], notes: &mut Vec<String>) {
         let (strain, stress) = (&self.strains[0], &self.stresses[0]);
         if self.strains.len() == 2 {
             return;
@@ -344,7 +339,7 @@ impl TestColumns {
                 rows.iter_mut().filter(|row| may && (by_heading || row.compression)).collect();
             if of.iter_mut().all(|row| *value(row) >= 0.0) && !of.is_empty() {
                 of.iter_mut().for_each(|row| *value(row) = 0.0 - *value(row));
-                notes.push(format!("{name} of compression, positive in the file, are taken as negative"));
+                notes.push(format!("{name} in compression, positive in the file, become negative"));
             }
         }
     }
@@ -365,9 +360,9 @@ impl TestColumns {
         };
         let biaxial = if self.strains.len() == 2 { "biaxial, " } else { "" };
         let assumed = match (self.strains[0].assumed, self.stresses[0].assumed) {
-            (true, true) => " (the headings do not say which; keys `strain` and `stress`)",
-            (true, false) => " (the heading does not say which strain; key `strain`)",
-            (false, true) => " (the heading does not say which stress; key `stress`)",
+            (true, true) => " (assumed; the keys `strain` and `stress` set them)",
+            (true, false) => " (strain assumed; the key `strain` sets it)",
+            (false, true) => " (stress assumed; the key `stress` sets it)",
             (false, false) => "",
         };
         let stretches =
@@ -442,7 +437,7 @@ fn choose<M: Copy + PartialEq>(
         [(column, measure, role)] => Ok(chosen(*column, *measure, Some(role))),
         [] => {
             let raw = roles.iter().flatten().any(|role| role.what == ColumnKind::Raw);
-            let advice = "; forces are divided by the undeformed area, displacements by the free length";
+            let advice = "; divide forces by the undeformed area and displacements by the free length";
             Err(file.refuse_headings(format!("{LAYOUTS}{}", if raw { advice } else { "" })))
         }
         _ => Err(file.refuse_headings(format!(
