@@ -3,7 +3,7 @@
 use crystfem::program::run::{Crystfem, explain};
 use harness::case::{Options, run};
 use harness::report::Report;
-use harness::scene::HeatSource;
+use harness::scene::Source;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
@@ -30,10 +30,10 @@ ambient = "25 degC"
 end = "100 s"
 "#;
 
-fn source(here: &Path, mesh: &str, rest: &str) -> HeatSource {
+fn source(here: &Path, mesh: &str, rest: &str) -> Source {
     let text = format!("version = 1\nprogram = \"crystfem\"\n{mesh}{rest}{REST}");
     fs::write(here.join("case.toml"), text).unwrap();
-    HeatSource::read(here.join("case.toml")).unwrap()
+    Source::read(here.join("case.toml")).unwrap()
 }
 
 fn report(here: &Path, mesh: &str, rest: &str) -> Report {
@@ -241,7 +241,7 @@ fn files_of_thermal_analyses_are_opened_by_check() {
              [[nodes]]\nname = \"n\"\nfile = \"{file}\"\nunit = \"K\"\n{more}"
         );
         write("nodes.toml", &text);
-        HeatSource::read(here.join("nodes.toml")).unwrap()
+        Source::read(here.join("nodes.toml")).unwrap()
     };
     for (file, more, says) in [
         ("cold.vtu", "", "above 0 K"),

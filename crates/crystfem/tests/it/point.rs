@@ -4,10 +4,10 @@ use crystfem::kinetics::{KineticConstants, Kinetics, cooling_curve};
 use crystfem::program::run::{Crystfem, Failure};
 use harness::case::Options;
 use harness::report::Report;
-use harness::scene::HeatSource;
+use harness::scene::Source;
 use std::path::Path;
 
-fn run_quietly(source: &HeatSource, output: &Path, quick: bool) -> Result<Report, Failure> {
+fn run_quietly(source: &Source, output: &Path, quick: bool) -> Result<Report, Failure> {
     let options = Options { quick, ..Options::new(output) };
     harness::case::run::<Crystfem>(source, options).map(|finished| finished.report)
 }
@@ -45,7 +45,7 @@ source = "formulation.md, kinetics table"
 "#;
 
 fn run_in(folder: &Path, text: &str, quick: bool) -> Report {
-    let source = HeatSource::new(folder.join("case.toml"), text);
+    let source = Source::new(folder.join("case.toml"), text);
     match run_quietly(&source, &folder.join("out"), quick) {
         Ok(report) => report,
         Err(error) => panic!("{error}"),
@@ -101,7 +101,7 @@ data = [{ file = "out/slow.csv" }, { file = "fast.csv" }]
     });
     let fast: Vec<&str> = cooling.map(|(_, line)| line).collect();
     std::fs::write(folder.path().join("fast.csv"), fast.join("\n")).expect("a file");
-    let source = HeatSource::new(folder.path().join("fit.toml"), fit);
+    let source = Source::new(folder.path().join("fit.toml"), fit);
     let report = match run_quietly(&source, &folder.path().join("fit"), false) {
         Ok(report) => report,
         Err(error) => panic!("{error}"),
@@ -156,7 +156,7 @@ data = [{}, {}]
             data("slow"),
             data("fast")
         );
-        let source = HeatSource::new(folder.path().join("fit.toml"), &text);
+        let source = Source::new(folder.path().join("fit.toml"), &text);
         let output = folder.path().join("fit");
         let report = match run_quietly(&source, &output, false) {
             Ok(report) => report,

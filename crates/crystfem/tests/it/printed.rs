@@ -7,7 +7,7 @@ use crystfem::mesh::{Bar, Grid, Substrate};
 use crystfem::printed::PrintedPart;
 use crystfem::program::scene::PartScene;
 use crystfem::simulation::{Settings, Simulation};
-use harness::scene::HeatSource;
+use harness::scene::Source;
 use std::sync::Arc;
 
 const SCENE: &str = include_str!("../../../../cases/ch4/printed-bar/case.toml");
@@ -25,7 +25,7 @@ fn equals_the_scene() {
     let part = part.hold("bottom", 353.15).convection(15.0, 353.15).radiation(0.9, 353.15);
     let part = part.problem().unwrap();
 
-    let source = HeatSource::new("case.toml", SCENE);
+    let source = Source::new("case.toml", SCENE);
     let scene: PartScene = source.parse().unwrap();
     let built = scene.mesh.build(&source).unwrap();
     let whole = scene.task(&source, built).unwrap().problem;
