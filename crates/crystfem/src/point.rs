@@ -160,7 +160,7 @@ impl PointProcess<'_> {
             _ => (0.0, 0.0),
         };
         if steps > MAX_STEPS as f64 {
-            let allowed = format!("one that makes at most {MOST_STEPS} steps");
+            let allowed = format!("one that makes at most {MAX_STEPS} steps");
             return Err(Error::Parameter { name: "step (s or K)", found: step, allowed });
         }
         match self.stepping {
@@ -223,7 +223,7 @@ impl PointProcess<'_> {
                 return Ok(());
             }
             if curves.time.len() > MAX_STEPS {
-                let allowed = format!("steps that make at most {MOST_STEPS}");
+                let allowed = format!("steps that make at most {MAX_STEPS}");
                 return Err(Error::Parameter { name: "time step, s", found: dt, allowed });
             }
             done = after;

@@ -3,7 +3,7 @@
 use super::bed::{bed_nodes, loose_elements, out_of_flatness, remove_rigid_motion, statically_determinate};
 use crate::error::Error;
 use crate::mechanics::{
-    Body, BodyState, EnergyBalance, FIRST_ORDER_NODES, FixedComponent, SolidifyingMaxwell, points, shares,
+    Body, BodyState, EnergyBalance, FixedComponent, MAX_NODES_PER_ELEMENT, SolidifyingMaxwell, points, shares,
 };
 use crate::mesh::Mesh;
 use crate::simulation::Simulation;
@@ -53,7 +53,7 @@ impl StressSettings {
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 struct ElementThermalState {
     /// Temperatures of the nodes, K.
-    nodes: [f64; FIRST_ORDER_NODES],
+    nodes: [f64; MAX_NODES_PER_ELEMENT],
     /// Number of nodes.
     count: usize,
     /// α.
@@ -146,7 +146,7 @@ impl<'a> StressCoupling<'a> {
         let degrees = simulation.element_means("alpha");
         let births = &simulation.problem().births;
         let now = |element: usize| -> Option<ElementThermalState> {
-            let (mut nodes, own) = ([0.0; FIRST_ORDER_NODES], self.mesh.nodes(element as u32));
+            let (mut nodes, own) = ([0.0; MAX_NODES_PER_ELEMENT], self.mesh.nodes(element as u32));
             for (value, &node) in nodes.iter_mut().zip(own) {
                 *value = simulation.temperature(node)?;
             }
@@ -170,7 +170,7 @@ impl<'a> StressCoupling<'a> {
                 let birth = (simulation.state().born[element] as usize).checked_sub(1);
                 self.state.last[element] = match birth.and_then(|birth| births.get(birth)) {
                     Some(birth) => Some(ElementThermalState {
-                        nodes: [birth.temperature; FIRST_ORDER_NODES],
+                        nodes: [birth.temperature; MAX_NODES_PER_ELEMENT],
                         count: self.mesh.nodes(element as u32).len(),
                         degree: self.settings.initial_alpha,
                         time: birth.time,

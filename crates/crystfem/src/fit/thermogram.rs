@@ -1,6 +1,6 @@
 //! Thermograms of a calorimeter, as measurements for a fit.
 
-use super::{Baseline, Peak, Run, at};
+use super::{Baseline, Peak, Run, interpolate};
 use crate::error::Error;
 
 /// A measured heat flow.

@@ -69,10 +69,10 @@ pub fn check(mesh: &Mesh, labels: Option<&[u64]>) -> Result<Quality, Error> {
         return refuse(worst.determinant, "inverted or without volume, Jacobian", "above 0 m³".into());
     }
     if worst.scaled.0.is_nan() || worst.scaled.0 < MIN_SCALED_JACOBIAN {
-        return refuse(worst.scaled, "sliver, scaled Jacobian", format!("{LEAST_SCALED_JACOBIAN:e} or more"));
+        return refuse(worst.scaled, "sliver, scaled Jacobian", format!("{MIN_SCALED_JACOBIAN:e} or more"));
     }
     if worst.aspect.0.is_nan() || worst.aspect.0 > MAX_ASPECT {
-        return refuse(worst.aspect, "longest over shortest edge", format!("at most {GREATEST_ASPECT:e}"));
+        return refuse(worst.aspect, "longest over shortest edge", format!("at most {MAX_ASPECT:e}"));
     }
     check_duplicates(mesh, labels)?;
     check_sets(mesh)?;

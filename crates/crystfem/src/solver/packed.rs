@@ -292,7 +292,7 @@ fn add<S: Simd>(simd: S, entry: &[f32; LANES], x: &[f64], sums: &mut [S::f64s; L
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::system::Row;
+    use crate::system::RowBuilder;
 
     /// Products on a grid of 90 × 70 with unequal entries, between ordered and between scattered neighbours,
     /// agree with f64 to the rounding of f32, and exactly on uniform vectors.
@@ -352,7 +352,7 @@ mod tests {
     #[test]
     fn unchanged_items_are_kept() {
         let fill = |scale: f64| {
-            move |row: usize, out: &mut Row| {
+            move |row: usize, out: &mut RowBuilder| {
                 out.begin(std::iter::once(row as u32));
                 let own = scale + 0.1 * (row as f64).sin();
                 out.add(0, 2.0 * own, 0.0);
@@ -374,7 +374,7 @@ mod tests {
         let second = made(&packed);
         assert_eq!(second.iter().zip(&first).map(|(a, b)| a == b).collect::<Vec<_>>(), [true, false, false]);
         assert_eq!(second.len(), 5);
-        let whole = ConductionRows::build(size, false, |row, out: &mut Row| {
+        let whole = ConductionRows::build(size, false, |row, out: &mut RowBuilder| {
             fill(if changed.binary_search(&(row as u32)).is_ok() { 2.0 } else { 1.0 })(row, out);
         });
         let mut fresh = PackedRows::default();
@@ -390,7 +390,7 @@ mod tests {
     #[test]
     fn rows_of_their_own() {
         let fill = |own: bool| {
-            move |row: usize, out: &mut Row| {
+            move |row: usize, out: &mut RowBuilder| {
                 out.begin(std::iter::once(row as u32));
                 out.add(0, 2.0 + (row as f64).sin(), 0.0);
                 (0..row.min(2)).for_each(|k| out.add(-1 - k as i32, -0.3, 0.0));

@@ -25,7 +25,7 @@ pub(super) enum SetKind {
 pub(super) enum SetEntry {
     Label(u64),
     Range([u64; 3]),
-    FileSet(String),
+    Set(String),
     /// A label or set of elements and a side, or `None` for outer sides.
     Side(Box<SetEntry>, Option<u8>),
 }

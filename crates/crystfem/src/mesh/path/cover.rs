@@ -124,7 +124,7 @@ pub(super) fn activation(
     if let Some(value) =
         path.moves.iter().flat_map(values).find(|value| value.is_nan() || value.abs() > LARGEST_COORDINATE)
     {
-        let allowed = format!("places and times up to {FAR:e} m and s");
+        let allowed = format!("places and times up to {LARGEST_COORDINATE:e} m and s");
         return Err(Error::Parameter { name: "move of the path", found: value, allowed });
     }
     let mut earliest = vec![f64::INFINITY; elements.len()];
