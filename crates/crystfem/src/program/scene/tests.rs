@@ -138,7 +138,11 @@ fn bad_points() {
             &["`material.melting.shape`", "1.001"],
         ),
         ("name = \"a\"", "name = \"a/b\"".into(), &["`point[0].name`", "it names files"]),
-        (legs, String::new(), &["missing `point[0].legs`: write one of `legs`, `history`, `exchange`, `adiabatic`"]),
+        (
+            legs,
+            String::new(),
+            &["missing `point[0].legs`: write one of `legs`, `history`, `exchange`, `adiabatic`"],
+        ),
         (legs, format!("{legs}\nadiabatic = true"), &["`point[0].adiabatic` conflicts with `point[0].legs`"]),
         (legs, "adiabatic = true".into(), &["missing `point[0].duration`: `adiabatic` needs it"]),
         (legs, "adiabatic = true\nduration = \"-1 s\"".into(), &["`point[0].duration`", "above 0"]),
@@ -195,9 +199,21 @@ fn bad_fits() {
         (", rate = \"1 K/min\"", "", &["a.csv:1: headings", "`time [unit]`"]),
         ("frozen = \"21 degC\"", "", &["missing `fit[0].frozen`", "`glass_transition`"]),
         ("frozen = \"21 degC\"", "frozen = \"200 degC\"", &["above the temperature of frozen chains"]),
-        ("equilibrium_melting = \"193.2 degC\"", "", &["missing `fit[0].equilibrium_melting`", "Hoffman–Weeks"]),
-        ("law = \"nakamura\"", "law = \"avrami\"", &["unexpected `fit[0].equilibrium_melting`: it belongs to `law = \"nakamura\"`"]),
-        ("law = \"nakamura\"", "law = \"nakamura\"\ntemperatures = [\"157 degC\"]", &["unexpected `fit[0].temperatures`: it belongs to `law = \"ozawa\"`"]),
+        (
+            "equilibrium_melting = \"193.2 degC\"",
+            "",
+            &["missing `fit[0].equilibrium_melting`", "Hoffman–Weeks"],
+        ),
+        (
+            "law = \"nakamura\"",
+            "law = \"avrami\"",
+            &["unexpected `fit[0].equilibrium_melting`: it belongs to `law = \"nakamura\"`"],
+        ),
+        (
+            "law = \"nakamura\"",
+            "law = \"nakamura\"\ntemperatures = [\"157 degC\"]",
+            &["unexpected `fit[0].temperatures`: it belongs to `law = \"ozawa\"`"],
+        ),
         ("data = [{ file = \"a.csv\", rate = \"1 K/min\" }]", "data = []", &["`fit[0].data`", "at least 1"]),
         ("name = \"a\"", "name = \"\"", &["it names files"]),
     ];
@@ -229,7 +245,10 @@ fn bad_fits() {
     let level = flow("w.csv", "", "up").replace("exothermal", "latent_heat = \"0 J/g\", exothermal");
     let cases: &[(String, &[&str])] = &[
         (flow("mw.csv", "", "down"), &["missing `fit[0].data[0].mass`", "mw.csv is a power", "5.2 mg"]),
-        (flow("w.csv", ", mass = \"2 mg\"", "up"), &["unexpected `fit[0].data[0].mass`", "w.csv is already per mass"]),
+        (
+            flow("w.csv", ", mass = \"2 mg\"", "up"),
+            &["unexpected `fit[0].data[0].mass`", "w.csv is already per mass"],
+        ),
         (flow("w.csv", ", mass = \"0 mg\"", "up"), &["`fit[0].data[0].mass`", "above 0"]),
         (
             flow("w.csv", "", "down"),
@@ -244,7 +263,7 @@ fn bad_fits() {
         (flow("w.csv", ", from = \"20 s\"", "up"), &["`fit[0].data[0].from`", "20 s", "0 to 18 s"]),
         (
             flow("w.csv", ", to = \"150 degC\"", "up"),
-            &["`fit[0].data[0].to`", "150.00 degC", "falls through", "160.00 to 170.00"],
+            &["`fit[0].data[0].to`", "150.00 degC", "passes on cooling", "160.00 to 170.00"],
         ),
         (flow("w.csv", ", from = \"9 s\", to = \"3 s\"", "up"), &["`fit[0].data[0].to`", "after `from`"]),
         (
