@@ -23,7 +23,8 @@ fn data_sets(folder: &Path) -> Vec<PathBuf> {
     fs::write(&csv, table(6)).unwrap();
     let set = read(&csv, &ReadOptions::default()).unwrap();
     let parts = split(&set, SplitMethod::Path, Fractions::default(), 1).unwrap();
-    let standardisation = Standardisation::of(set.rows().map(|row| &row.c).collect::<Vec<_>>().into_iter());
+    let standardisation =
+        Standardisation::from_rows(set.rows().map(|row| &row.c).collect::<Vec<_>>().into_iter());
     let files = ["plain.h5", "split.h5", "old.h5", "new.h5"].map(|name| folder.join(name));
     hdf5::write(&files[0], &set, None).unwrap();
     hdf5::write(&files[1], &set, Some((&parts, &standardisation.unwrap()))).unwrap();

@@ -210,7 +210,7 @@ fn a_hot_spot_in_a_plate() {
 
 /// Mixed element types, and unsupported ones.
 #[test]
-fn kinds_are_told_apart() {
+fn element_types_can_be_mixed() {
     let wedges = brick([1.0; 3], [1, 1, 1], CellSplit::Wedges, false);
     assert!(Body::new(&wedges, 0.3).is_err());
     assert!(Body::new(&wedges.second_order(), 0.3).is_err());

@@ -183,5 +183,5 @@ fn yaml_and_averages_of_lammps() {
     // a job that restarts is another run
     let twice = format!("{heading}{0}{0}", rows(0)).replace("v_l", "l").replace("v_p", "p");
     let set = read_file("out.dat", &twice, &ReadOptions { origin: Some(BoxReference::Run), ..real });
-    assert!(refused(set).contains("with the same rows"));
+    assert!(refused(set).contains("the same rows in the runs"));
 }

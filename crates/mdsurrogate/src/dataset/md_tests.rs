@@ -1,6 +1,6 @@
 //! Tables of boxes, of F with stresses of all measures, and LAMMPS output.
 
-use super::lammps_tests::log;
+use super::lammps_tests::lammps_log;
 use super::*;
 
 pub(super) fn read_file(name: &str, text: &str, options: &ReadOptions) -> Result<Dataset, Error> {

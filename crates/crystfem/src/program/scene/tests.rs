@@ -113,12 +113,12 @@ fn bad_points() {
         (
             "crystallinity = 0.25",
             "crystallinity = 0.25\nsign = \"mended\"".into(),
-            &["`material.sign`", "law = \"as-published\""],
+            &["unexpected `material.sign`: it belongs to `law = \"as-published\"`"],
         ),
         (
             "law = \"semicrystalline\"",
             "law = \"conductor\"".into(),
-            &["`material.kinetics`", "`kinetics` of a material that has none"],
+            &["unexpected `material.kinetics`: it belongs to `law = \"semicrystalline\"`"],
         ),
         ("density = \"1010 kg/m^3\"", "density = \"0 kg/m^3\"".into(), &["`material.density`", "above 0"]),
         (
@@ -138,12 +138,16 @@ fn bad_points() {
             &["`material.melting.shape`", "1.001"],
         ),
         ("name = \"a\"", "name = \"a/b\"".into(), &["`point[0].name`", "it names files"]),
-        (legs, String::new(), &["one of `legs`, `history`, `exchange`, `adiabatic`"]),
-        (legs, format!("{legs}\nadiabatic = true"), &["`adiabatic` together with `legs`"]),
-        (legs, "adiabatic = true".into(), &["`point[0].duration`", "`adiabatic` needs it"]),
+        (
+            legs,
+            String::new(),
+            &["missing `point[0].legs`: write one of `legs`, `history`, `exchange`, `adiabatic`"],
+        ),
+        (legs, format!("{legs}\nadiabatic = true"), &["`point[0].adiabatic` conflicts with `point[0].legs`"]),
+        (legs, "adiabatic = true".into(), &["missing `point[0].duration`: `adiabatic` needs it"]),
         (legs, "adiabatic = true\nduration = \"-1 s\"".into(), &["`point[0].duration`", "above 0"]),
-        (legs, "history = \"none.csv\"".into(), &["`point[0].start`", "`start` together with `history`"]),
-        ("start = \"200 degC\"\n", String::new(), &["`point[0].start`", "`legs` needs it"]),
+        (legs, "history = \"none.csv\"".into(), &["`point[0].start` conflicts with `point[0].history`"]),
+        ("start = \"200 degC\"\n", String::new(), &["missing `point[0].start`: `legs` needs it"]),
         ("start = \"200 degC\"", "start = \"-300 degC\"".into(), &["below absolute zero"]),
         (
             legs,
@@ -156,17 +160,17 @@ fn bad_points() {
         (
             legs,
             format!("{legs}\ntime_step = \"1 s\"\nlargest_change = 0.1"),
-            &["`largest_change` together with `time_step`"],
+            &["`point[0].largest_change` conflicts with `point[0].time_step`"],
         ),
         (
             legs,
             format!("{legs}\nmaterials = [\"b\"]"),
-            &["`point[0].materials[0]`", "there is only `[material]`"],
+            &["unexpected `point[0].materials[0]`: the only material is `[material]`"],
         ),
         (legs, format!("{legs}\n[[compare]]\nmaterial = \"a\"\nwith = \"b\""), &["`compare[0].material`"]),
         ("[material]", "[materials.x]".into(), &["point a"]),
-        ("[[point]]", "[[fit]]\nname = \"x\"\n[[point]]".into(), &["`fit` together with `point`"]),
-        ("[[point]]", "[[pint]]".into(), &["a scene without a task"]),
+        ("[[point]]", "[[fit]]\nname = \"x\"\n[[point]]".into(), &["`fit` conflicts with `point`"]),
+        ("[[point]]", "[[pint]]".into(), &["missing `mesh`: the scene needs a block"]),
     ];
     let folder = tempfile::tempdir().unwrap();
     let mut missed = Vec::new();
@@ -189,15 +193,27 @@ fn bad_fits() {
     let cases: &[(&str, &str, &[&str])] = &[
         ("law = \"nakamura\"", "law = \"nakamora\"", &["did you mean `nakamura`"]),
         ("file = \"a.csv\"", "file = \"none.csv\"", &["`fit[0].data[0].file`: cannot read", "none.csv"]),
-        ("file = \"a.csv\"", "file = \"rising.csv\"", &["measurement 2", "temperatures that fall"]),
+        ("file = \"a.csv\"", "file = \"rising.csv\"", &["measurement 2", "decreasing temperatures"]),
         ("file = \"a.csv\"", "file = \"text.csv\"", &["text.csv:2: column 2, `alpha`: found \"much\""]),
         ("rate = \"1 K/min\"", "rate = \"0 K/min\"", &["`fit[0].data[0].rate`", "above 0"]),
         (", rate = \"1 K/min\"", "", &["a.csv:1: headings", "`time [unit]`"]),
-        ("frozen = \"21 degC\"", "", &["`fit[0].frozen`", "`glass_transition`"]),
+        ("frozen = \"21 degC\"", "", &["missing `fit[0].frozen`", "`glass_transition`"]),
         ("frozen = \"21 degC\"", "frozen = \"200 degC\"", &["above the temperature of frozen chains"]),
-        ("equilibrium_melting = \"193.2 degC\"", "", &["`fit[0].equilibrium_melting`", "Hoffman–Weeks"]),
-        ("law = \"nakamura\"", "law = \"avrami\"", &["`fit[0].equilibrium_melting`", "of another law"]),
-        ("law = \"nakamura\"", "law = \"nakamura\"\ntemperatures = [\"157 degC\"]", &["law = \"ozawa\""]),
+        (
+            "equilibrium_melting = \"193.2 degC\"",
+            "",
+            &["missing `fit[0].equilibrium_melting`", "Hoffman–Weeks"],
+        ),
+        (
+            "law = \"nakamura\"",
+            "law = \"avrami\"",
+            &["unexpected `fit[0].equilibrium_melting`: it belongs to `law = \"nakamura\"`"],
+        ),
+        (
+            "law = \"nakamura\"",
+            "law = \"nakamura\"\ntemperatures = [\"157 degC\"]",
+            &["unexpected `fit[0].temperatures`: it belongs to `law = \"ozawa\"`"],
+        ),
         ("data = [{ file = \"a.csv\", rate = \"1 K/min\" }]", "data = []", &["`fit[0].data`", "at least 1"]),
         ("name = \"a\"", "name = \"\"", &["it names files"]),
     ];
@@ -228,8 +244,11 @@ fn bad_fits() {
     let block = two.find("[[fit]]").unwrap();
     let level = flow("w.csv", "", "up").replace("exothermal", "latent_heat = \"0 J/g\", exothermal");
     let cases: &[(String, &[&str])] = &[
-        (flow("mw.csv", "", "down"), &["`fit[0].data[0].mass`", "mw.csv is a power", "5.2 mg"]),
-        (flow("w.csv", ", mass = \"2 mg\"", "up"), &["`fit[0].data[0].mass`", "one per mass"]),
+        (flow("mw.csv", "", "down"), &["missing `fit[0].data[0].mass`", "mw.csv is a power", "5.2 mg"]),
+        (
+            flow("w.csv", ", mass = \"2 mg\"", "up"),
+            &["unexpected `fit[0].data[0].mass`", "w.csv is already per mass"],
+        ),
         (flow("w.csv", ", mass = \"0 mg\"", "up"), &["`fit[0].data[0].mass`", "above 0"]),
         (
             flow("w.csv", "", "down"),
@@ -244,7 +263,7 @@ fn bad_fits() {
         (flow("w.csv", ", from = \"20 s\"", "up"), &["`fit[0].data[0].from`", "20 s", "0 to 18 s"]),
         (
             flow("w.csv", ", to = \"150 degC\"", "up"),
-            &["`fit[0].data[0].to`", "150.00 degC", "falls through", "160.00 to 170.00"],
+            &["`fit[0].data[0].to`", "150.00 degC", "passes on cooling", "160.00 to 170.00"],
         ),
         (flow("w.csv", ", from = \"9 s\", to = \"3 s\"", "up"), &["`fit[0].data[0].to`", "after `from`"]),
         (
@@ -253,16 +272,16 @@ fn bad_fits() {
         ),
         (
             flow("w.csv", "", "up").replace("name = \"a\"", "name = \"estimates\""),
-            &["`fit[0].name`", "estimates.csv has all estimates", "another name"],
+            &["`fit[0].name`", "estimates.csv holds all estimates", "a different name"],
         ),
         (
             [two.as_str(), &two[block..].replace("name = \"a\"", "name = \"a-heat-flow\"")].concat(),
-            &["`fit[1].name`", "a-heat-flow.csv has the heat flow of `a`", "another name"],
+            &["`fit[1].name`", "a-heat-flow.csv holds the heat flow of `a`", "a different name"],
         ),
         (level, &["`fit[0].heat_flow.latent_heat`", "above 0"]),
         (
             good.replace("rate =", "mass = \"1 mg\", rate ="),
-            &["`fit[0].data[0].mass`", "`heat_flow` in the fit"],
+            &["unexpected `fit[0].data[0].mass`: it belongs to raw heat flow", "`heat_flow` to the fit"],
         ),
         (
             flow("w.csv", "", "up").replace("\"up\"", "\"up\", baseline = \"tangential\""),

@@ -76,7 +76,7 @@ fn law_names(laws: &[PathBuf]) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::names;
+    use super::law_names;
 
     #[test]
     fn equal_names_get_folder_and_number() {
