@@ -278,7 +278,7 @@ fn a_stress_is_handed_over() {
         .replace("max = [\"8 mm\", \"4 mm\"]", "max = [\"4 mm\", \"2 mm\"]");
     write(here, &[("strip", &held)]);
     let ended = strip(here, "").with_code(2);
-    ended.tells("found a table of a tensor");
+    ended.tells("unexpected `material.fields[0].table`: the strain of a stress tensor");
     let table = "table = [[0, \"0.9 GPa\"], [0.25, \"1.6 GPa\"]]";
     let turned = held
         .replace(table, "placement = { axes = [\"-y\", \"x\"], origin = [\"0 mm\", \"4 mm\", \"0 mm\"] }");

@@ -152,6 +152,24 @@ impl Source {
         SceneError::value(self, &key, span, &found.to_string(), &allowed.to_string())
     }
 
+    /// Reports a key that must be written: "missing `key`: needed for …".
+    pub fn missing(&self, key: &str, why: impl ToString) -> SceneError {
+        let (key, span) = self.place(key);
+        SceneError::missing(self, key, span, &why.to_string())
+    }
+
+    /// Reports a key that has no meaning here: "unexpected `key`: …".
+    pub fn unexpected(&self, key: &str, why: impl ToString) -> SceneError {
+        let (key, span) = self.place(key);
+        SceneError::unexpected(self, key, span, &why.to_string())
+    }
+
+    /// Reports a key that excludes another one: "`key` conflicts with `other`: …".
+    pub fn conflict(&self, key: &str, other: &str, why: impl ToString) -> SceneError {
+        let (key, span) = self.place(key);
+        SceneError::conflict(self, key, span, other, &why.to_string())
+    }
+
     /// As [`Source::error`], of what already tells what was found and what is allowed: a file that cannot be used.
     pub fn refused(&self, key: &str, error: impl ToString) -> SceneError {
         let (key, span) = self.place(key);

@@ -1,6 +1,6 @@
-//! An elastic block in motion, on a device and by the host's kernel: bonds, steps, seconds, directed bonds a
-//! second, and how far forces are apart. `cargo bench -p peri --no-default-features --features gpu --bench
-//! gpu -- 60 100`: 60³ particles, 100 steps.
+//! Elastic block in motion, on a device and by the kernel of the host: bonds, steps, seconds, directed bonds
+//! per second, and the difference of forces. `cargo bench -p peri --no-default-features --features gpu
+//! --bench gpu -- 60 100`: 60³ particles, 100 steps.
 
 use peri::bonds::{BodyGeometry, BondDamage, BondForces, LatticeBonds, force};
 use peri::calibrate::{Space, modulus};
@@ -41,7 +41,7 @@ fn measure<const D: usize>(cells: u32, steps: u64) -> Result<(), Box<dyn std::er
     let rate = (count * evaluations) as f64 / seconds;
     println!(
         "  host, {threads} threads, Double: {count} bonds, {evaluations} forces, {seconds:.3} s, {rate:.3e} \
-        directed bonds/s"
+         directed bonds/s"
     );
 
     let largest = |field: &Field<D>| {
@@ -77,7 +77,7 @@ fn measure<const D: usize>(cells: u32, steps: u64) -> Result<(), Box<dyn std::er
         let [error, moved] = [apart / largest(&expected), largest(&motion.displacement) / SPACING];
         println!(
             "  {name}, {precision:?}: {count} bonds, {steps} steps, {seconds:.3} s, {rate:.3e} directed \
-            bonds/s, forces off by \
+             bonds/s, forces off by \
              {error:.1e} of the largest; displacements up to {moved:.3} spacings"
         );
     }

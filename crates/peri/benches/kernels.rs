@@ -8,7 +8,7 @@ use peri::stress::{BallVolume, StressInput, StressMethod, SurfaceCompensation, p
 
 mod kernel;
 
-/// Particles that fit into the caches.
+/// Numbers of particles that fit into the caches.
 const SIZE: f64 = 1e4;
 
 fn dimension<const D: usize>(criterion: &mut Criterion) -> Result<(), peri::Error> {

@@ -1,4 +1,4 @@
-//! A rubber disc pressed between two rigid planes: load, and the width of its contact.
+//! Presses a rubber disc between two rigid planes: load and width of contact.
 
 use peri::contact::RigidPlane;
 use peri::geometry::Shape;

@@ -1,5 +1,5 @@
-//! J-integral of a long strip with a crack from one end to its middle, as Rivlin and Thomas (1953) tore
-//! rubber: J = W(λ) h, whatever the ring around the tip.
+//! J-integral of a long strip with a crack from one end to its middle, as in the tests of Rivlin and Thomas
+//! (1953): J = W(λ) h for any ring around the tip.
 
 use peri::calibrate::Space;
 use peri::geometry::{Cut, Shape};

@@ -1,5 +1,5 @@
-//! A rubber strip between two rigid plates, which bond laws cannot describe: it is stiff because its volume
-//! cannot change. Plane strain, eight-chain network; apparent modulus against Gent & Lindley's for thin
+//! Rubber strip between two rigid plates, which bond laws cannot describe: it is stiff because its volume
+//! cannot change. Plane strain, eight-chain network; apparent modulus, compared with Gent & Lindley for thin
 //! bonded strips (1959, doi:10.1243/PIME_PROC_1959_173_022_02).
 
 use peri::calibrate::Space;
@@ -8,7 +8,8 @@ use peri::material::{EightChainSolid, NonlocalSolid};
 use peri::model::{Body, Model};
 use peri::solver::Lbfgs;
 
-/// Apparent modulus P/(w ε), Pa, of a strip of width w and height h between plates that approach by 1 %.
+/// Returns the apparent modulus P/(w ε), Pa, of a strip of width w and height h between plates that approach
+/// by 1 %.
 pub fn apparent_modulus(width: f64, height: f64, spacing: f64, bulk: f64) -> Result<f64, peri::Error> {
     // the plates are two horizons thick, as materials with two passes need
     let plate = 6.0 * spacing;

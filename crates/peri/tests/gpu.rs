@@ -1,4 +1,4 @@
-//! Lattices on a device against the kernel of the host.
+//! Lattices on a device, compared with the kernel of the host.
 
 #[path = "it/bodies.rs"]
 #[allow(dead_code)] // shared by all tests
@@ -18,7 +18,7 @@ use peri::solver::{Breaking, Method, Policy, State, System, VelocityVerlet};
 
 const DENSITY: f64 = 2.3;
 
-/// Every precision of this machine's device; reports the test as skipped if there is none.
+/// Returns every precision of this machine's device; reports a skipped test without a device.
 #[track_caller]
 fn devices() -> Vec<Device> {
     let open = |precision| Device::portable()?.with_precision(precision);
@@ -26,7 +26,7 @@ fn devices() -> Vec<Device> {
     if found.is_empty() {
         evidence::skipped(
             "a device behind Vulkan, Metal or DirectX 12 (a program that stands for one: \
-            mesa-vulkan-drivers)",
+             mesa-vulkan-drivers)",
         );
     }
     found
@@ -41,14 +41,13 @@ fn random<const D: usize>(bonds: &LatticeBonds<D>, size: f64) -> Field<D> {
     field
 }
 
-/// Two slits and a hole; no correction that devices do not support.
+/// A body with two slits and a hole, without corrections.
 fn damaged<const D: usize>(cells: [usize; D]) -> LatticeBonds<D> {
     Body { surface: None, ..Body::damaged(cells, 1e-3, 3.015) }.build().lattice
 }
 
-/// Bound of the effect of rounding of displacements, law and sums on a particle's force: with c = 2kθ w V/|ξ|
-/// and the rounding ε|ξ + η|(|u_I| + |u_J|) of E, of which q is a function, Σ_J c (|q| + |q′| |δE|/ε
-/// + |q|)|ζ|.
+/// Bound of the rounding error of a particle's force, from displacements, law and sums: Σ_J c (|q| + |q′|
+/// |δE|/ε + |q|)|ζ| with c = 2kθ w V/|ξ| and the rounding ε|ξ + η|(|u_I| + |u_J|) of E, on which q depends.
 fn sizes<const D: usize>(bonds: &LatticeBonds<D>, law: &KernelFit, u: &Field<D>) -> Vec<f64> {
     let of = |site: u32| {
         let mut size = 0.0;
@@ -106,8 +105,8 @@ fn gpu_forces_are_those_of_the_host() {
     }
 }
 
-/// Compares a slit sheet or block that stretches evenly, at first and later at its ends: bonds break beside
-/// slits and hole, the same on host and device.
+/// A slit sheet or block with initially uniform stretch and moving ends: device and host break the same
+/// bonds.
 fn compare_motion<const D: usize>(device: &Device, cells: [usize; D], critical: f64) {
     const STEPS: u64 = 60;
     let law = Law::ChainOffset.build(720.0, 1200.0, false).unwrap();
@@ -231,7 +230,7 @@ fn smallest_bodies(device: &Device) {
     assert!(LatticeBonds::new(empty, 3.015, VolumeCorrection::None, &[]).is_err());
 }
 
-/// Unsupported features are refused and non-finite values located, each by name.
+/// Unsupported bodies and values that are not finite are refused by name.
 #[test]
 fn gpu_refusals() {
     let Some(device) = devices().pop() else { return };
@@ -277,7 +276,7 @@ fn gpu_refusals() {
     assert!(body.start(&start).unwrap_err().to_string().contains("time step: found 0"));
 }
 
-/// A body that exceeds the memory is refused with the name of the buffer.
+/// A body larger than the memory of the device is refused.
 #[test]
 fn gpu_bodies_beyond_the_memory() {
     let Some(device) = devices().pop() else { return };

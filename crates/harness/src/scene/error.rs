@@ -170,6 +170,24 @@ impl SceneError {
         Self::at(source, "scene::value", Some(key), span, message).label("found here")
     }
 
+    pub(super) fn missing(source: &Source, key: String, span: Range<usize>, why: &str) -> Self {
+        let message = format!("missing `{key}`: {why}");
+        // a block that the file lacks belongs to its end
+        let end = source.text.trim_end().len();
+        let span = if span.is_empty() { end.saturating_sub(1)..end } else { span };
+        Self::at(source, "scene::missing_key", Some(key), span, message).label("needed here")
+    }
+
+    pub(super) fn unexpected(source: &Source, key: String, span: Range<usize>, why: &str) -> Self {
+        let message = format!("unexpected `{key}`: {why}");
+        Self::at(source, "scene::unexpected_key", Some(key), span, message).label("remove this")
+    }
+
+    pub(super) fn conflict(source: &Source, key: String, span: Range<usize>, other: &str, why: &str) -> Self {
+        let message = format!("`{key}` conflicts with `{other}`: {why}");
+        Self::at(source, "scene::conflict", Some(key), span, message).label("here")
+    }
+
     /// Translates serde's words for the reader of a TOML file.
     pub(super) fn from_serde(source: &Source, root: &DeTable<'_>, error: &toml::de::Error) -> Self {
         let span = error.span().unwrap_or(0..0);

@@ -41,6 +41,21 @@ struct Load {
     weight: Ratio,
 }
 
+#[test]
+fn missing_unexpected_and_conflicting_keys() {
+    let source = Source::new("scene.toml", GOOD);
+    let missing = source.missing("body.count", "needed for a test");
+    assert_eq!(missing.message(), "missing `body.count`: needed for a test");
+    assert_eq!((missing.key(), missing.line()), (Some("body.count"), Some(5)));
+    assert_eq!(source.missing("grip", "needed for a test").line(), Some(16), "the end of the file");
+    let unexpected = source.unexpected("body.law", "a test has none");
+    assert_eq!(unexpected.message(), "unexpected `body.law`: a test has none");
+    assert_eq!(unexpected.line(), Some(8));
+    let conflict = source.conflict("load[1].weight", "at", "write one of them");
+    assert_eq!(conflict.message(), "`load[1].weight` conflicts with `at`: write one of them");
+    assert_eq!(conflict.line(), Some(16));
+}
+
 const GOOD: &str = r#"
 version = 1
 name = "plate"

@@ -1,9 +1,10 @@
-//! Solids of the mean deformation in irregular clouds: kernels against plain loops, the patch test, the order
-//! of convergence, a hole.
+//! Solids of the mean deformation in irregular clouds: kernels against plain loops, patch test, order of
+//! convergence, a hole.
 
 use crate::bodies::{Random, hold};
 use crate::materials::checks;
-use crate::solids::{Plain, displaced, neo_hooke, rubber};
+use crate::solid_kernels::PlainLoops;
+use crate::solids::{displaced, neo_hooke, rubber};
 use crate::spectra::{COLLAR, errors, forces};
 use evidence::{at_most, near, within};
 use peri::bonds::{
@@ -18,8 +19,8 @@ use peri::material::{
 use peri::solver::{Lbfgs, Method, State, System};
 use std::f64::consts::PI;
 
-/// A block of side^D cells of a spacing, each particle shifted by up to `jitter` of it along each axis,
-/// volumes random within ±`uneven`.
+/// Block of side^D cells with particles shifted by up to `jitter` spacings along each axis and volumes random
+/// within ±`uneven`.
 struct Scattered {
     side: usize,
     spacing: f64,
@@ -76,7 +77,7 @@ fn largest<const D: usize>(field: &Field<D>) -> f64 {
     field.components().iter().flat_map(|c| c.iter()).fold(0.0, |most, x| most.max(x.abs()))
 }
 
-/// Severs each bond that `choose` selects by its ends, from both of them.
+/// Severs each bond that `choose` selects by its ends.
 fn sever<const D: usize>(bonds: &mut CloudBonds<D>, mut choose: impl FnMut(usize, usize) -> bool) {
     let mut list = Vec::new();
     for site in 0..bonds.sites() {
@@ -93,7 +94,7 @@ fn sever<const D: usize>(bonds: &mut CloudBonds<D>, mut choose: impl FnMut(usize
     bonds.break_bonds(&list);
 }
 
-/// Names a bond from both of its ends.
+/// Returns the entries of a bond at both ends.
 fn both<const D: usize>(bonds: &CloudBonds<D>, site: usize, other: usize, mut name: impl FnMut(usize, u32)) {
     for (from, to) in [(site, other), (other, site)] {
         let mut index = 0;
@@ -102,15 +103,15 @@ fn both<const D: usize>(bonds: &CloudBonds<D>, site: usize, other: usize, mut na
     }
 }
 
-/// Kernels against plain loops, with and without θ: whole, with broken and softened bonds, then so few that
-/// particles have springs, or no bond at all.
+/// Kernels agree with plain loops, with and without θ: intact, with broken and softened bonds, and with so
+/// few bonds that particles have springs or no bond.
 fn kernels_are_plain_loops<const D: usize>(space: Space, side: usize, correction: VolumeCorrection) {
     for relieved in [false, true] {
         let scattered = Scattered { uneven: 0.3, correction, ..Scattered::new(side, 0.25) };
         let mut bonds = scattered.build::<D>(relieved);
         let displacement = field(&bonds, displaced);
         let mut fast = rubber::<D>(space, 10.0).respond(&bonds);
-        let mut plain = Plain(rubber::<D>(space, 10.0)).respond(&bonds);
+        let mut plain = PlainLoops(rubber::<D>(space, 10.0)).respond(&bonds);
         let mut random = Random(7);
         for severed in [-1.0, -0.4, 0.6, 1.0] {
             let half = bonds.sites() / 2;
@@ -180,7 +181,7 @@ fn bits_in_clouds_do_not_depend_on_threads() {
     assert!(found[0] == found[1]);
 }
 
-/// Forces and gradients of every particle are corr.py's, intact and with a cut
+/// Forces and gradients of every particle agree with corr.py, intact and with a cut
 /// (`docs/reference/correspondence/t_relieved.py`).
 #[test]
 fn relieved_clouds_agree_with_an_independent_program() {
@@ -229,8 +230,8 @@ fn relieved_clouds_agree_with_an_independent_program() {
     }
 }
 
-/// The largest force on a particle inside, over μ and the spacing, under a uniform F, and the largest error
-/// of F.
+/// Returns the largest force on an inner particle under a uniform F, over μ and the spacing, and the largest
+/// error of F.
 fn patch<L: PointLaw<D>, const D: usize>(
     bonds: &CloudBonds<D>,
     solid: NonlocalSolid<L>,
@@ -253,7 +254,7 @@ fn patch<L: PointLaw<D>, const D: usize>(
     (residual, off)
 }
 
-/// Uniform deformation is in equilibrium in every family that no surface cuts.
+/// Uniform deformation is in equilibrium in every family away from surfaces.
 #[test]
 fn jittered_clouds_pass_the_patch_test() {
     for jitter in [0.1, 0.2] {
@@ -273,8 +274,8 @@ fn jittered_clouds_pass_the_patch_test() {
     }
 }
 
-/// Forces are slopes of the energy, to a part of 10⁹: intact, with 30 % of the bonds broken, and with some
-/// particles on springs.
+/// Forces are slopes of the energy to 1e-9: intact, with 30 % of the bonds broken, and with some particles on
+/// springs.
 fn slopes<const D: usize>(space: Space, side: usize, ratio: f64) {
     let mut bonds = Scattered { ratio, uneven: 0.2, ..Scattered::new(side, 0.2) }.build::<D>(true);
     let displacement = field(&bonds, displaced);
@@ -312,7 +313,7 @@ fn forces_in_relieved_clouds_are_slopes() {
     slopes::<3>(Space::Solid, 8, 2.015);
 }
 
-/// The energy released by a bond is the slope of the energy by its integrity, to the digits of differences.
+/// The released energy of a bond is the derivative of the energy by its integrity, to finite differences.
 #[test]
 fn bonds_of_relieved_clouds_release_the_slope_of_the_energy() {
     let mut bonds = Scattered { uneven: 0.2, ..Scattered::new(12, 0.2) }.build::<2>(true);
@@ -365,7 +366,7 @@ fn bonds_of_relieved_clouds_release_the_slope_of_the_energy() {
     }
 }
 
-/// The battery of all materials on relieved clouds: among others the bound of the stiffness.
+/// Relieved clouds pass the checks of all materials, including the bound of the stiffness.
 #[test]
 fn relieved_clouds_pass_the_battery() {
     let mut greatest = 0.0_f64;
@@ -383,8 +384,8 @@ fn relieved_clouds_pass_the_battery() {
     println!("λmax(K)/s V in relieved clouds: {greatest:.3}; the bound is 2");
 }
 
-/// Manufactured finite deformation on clouds shifted by a fifth of the spacing: another cloud than the
-/// independent program's, whose errors are 4.7e-3, 3.0e-3, 1.3e-3 plain and 3.3e-3, 5.8e-4, 1.2e-4 relieved.
+/// Manufactured finite deformation on clouds shifted by a fifth of the spacing. An independent program has on
+/// another cloud errors of 4.7e-3, 3.0e-3, 1.3e-3 plain and 3.3e-3, 5.8e-4, 1.2e-4 relieved.
 #[test]
 fn manufactured_deformations_of_clouds_converge() {
     let found = [false, true].map(|relieved| {
@@ -404,10 +405,10 @@ fn manufactured_deformations_of_clouds_converge() {
     at_most("cloud_manufactured_order_below_2", 2.0 - (found[1][1] / found[1][2]).log2(), 0.0);
 }
 
-/// A plate with a hole as rings of particles, Kirsch's displacements beyond three radii, plane strain, K/μ =
-/// 5/3: rms error of the stress beyond 1.5 radii over the remote one. The independent program has 0.01763 and
-/// 0.01622 plain, and with the correction in all families that no rim cuts 0.00954 and 0.00321 (0.0088 and
-/// 0.0029 with it from two horizons off the rim on).
+/// Plate with a hole as rings of particles, Kirsch's displacements beyond three radii, plane strain, K/μ =
+/// 5/3: rms error of the stress beyond 1.5 radii over the remote stress. The independent program has 0.01763
+/// and 0.01622 plain; with the correction in all families away from rims 0.00954 and 0.00321 (0.0088 and
+/// 0.0029 with it from two horizons off the rim).
 #[test]
 fn rings_around_a_hole() {
     let found = [false, true].map(|relieved| [10, 20].map(|n| ring_error(n, relieved)));
@@ -465,8 +466,8 @@ fn ring_error(n: usize, relieved: bool) -> f64 {
     (sum / f64::from(count)).sqrt()
 }
 
-/// Kirsch's displacement and stress (xx, yy, xy) around a free hole of radius 1 under unit tension along x,
-/// μ = 1, K = 5/3.
+/// Kirsch's displacement and stress (xx, yy, xy) around a free hole of radius 1 under unit tension along x, μ
+/// = 1, K = 5/3.
 fn kirsch([x, y]: [f64; 2]) -> ([f64; 2], [f64; 3]) {
     let (poisson, t) = (0.25, y.atan2(x));
     let (k, q) = (3.0 - 4.0 * poisson, 1.0 / x.hypot(y));

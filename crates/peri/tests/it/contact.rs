@@ -1,12 +1,12 @@
-//! Contact: Macek & Silling (2007), doi:10.1016/j.finel.2007.08.012, against plain sums and closed forms;
-//! balance, energy, objectivity; bodies pressed together; no list in any bit.
+//! Contact by Macek & Silling (2007), doi:10.1016/j.finel.2007.08.012, against plain sums and closed forms;
+//! balance, energy, objectivity; bodies pressed together; results independent of the list of pairs.
 
 use crate::bodies::{Body, Built, MODULUS, Random, distance, norm, rms, scatter};
 use peri::bonds::{BodyGeometry, Bonds, CloudBonds, Overstretched, VolumeCorrection};
 use peri::contact::{Contact, SHORT_RANGE};
 use peri::field::{CHUNK, Field};
 
-/// Contact forces on particles in input order, and the energy.
+/// Returns contact forces on particles in input order, and the energy.
 fn contact<const D: usize>(bonds: &dyn Bonds<D>, sites: &[usize], u: &[[f64; D]]) -> (Vec<[f64; D]>, f64) {
     let field = scatter(bonds.sites(), sites, u);
     let mut contact = Contact::short_range(bonds, MODULUS, SHORT_RANGE).unwrap();
@@ -18,7 +18,8 @@ fn contact<const D: usize>(bonds: &dyn Bonds<D>, sites: &[usize], u: &[[f64; D]]
     (sites.iter().map(|&site| force.get(site)).collect(), contact.summary(bonds, &field).energy)
 }
 
-/// The same by comparing all pairs: volumes and radii given, `bonded` by (I, J), I < J.
+/// Returns contact forces and energy by comparing all pairs, with given volumes and radii; `bonded` by (I,
+/// J), I < J.
 fn plainly<const D: usize>(
     points: &[[f64; D]],
     volumes: &[f64],
@@ -71,8 +72,8 @@ fn two_particles() {
     assert_eq!(contact(&near, &sites, &[[0.0; 2], [-1.0, 0.0]]), (vec![[0.0; 2]; 2], 0.0));
 }
 
-/// The force of particles at one point (r = 0) is κcd/δ along the reference bond, at any distance from home;
-/// the other limits are 0.
+/// At coincident positions (r = 0) the force is κcd/δ along the reference bond, at any displacement; the
+/// other limits are 0.
 #[test]
 fn degenerate_states() {
     let points = [[0.0, 0.0, 0.0], [1.2, 0.0, 1.6]];
@@ -144,7 +145,7 @@ fn lattice_and_cloud_equal_plain_sums() {
     check_plainly([4, 5, 24]);
 }
 
-/// Pairs whose bonds break join a list that stays valid; later moves within its skin need no other.
+/// Pairs whose bonds break join the existing list, and later moves within its skin need no new list.
 fn check_parted<const D: usize>(cells: [usize; D]) {
     fn parted<const D: usize>(bonds: &mut dyn Bonds<D>, sites: &[usize], count: usize) {
         let mut random = Random(11);
@@ -204,8 +205,8 @@ fn broken_bonds_join_the_list() {
     check_parted([12, 9, 8]);
 }
 
-/// Two blocks that fly at each other, a spacing in five steps, and shake: the list is made where they meet,
-/// not all along the way, and the forces are at any time those of a list made then.
+/// Two blocks approach, a spacing in five steps, and shake: the list is rebuilt where they meet, not during
+/// the approach, and forces always equal those of a new list.
 #[test]
 fn a_list_holds_while_bodies_fly() {
     let block = |low: f64| (0..36).map(move |k| [low + f64::from(k % 6), f64::from(k / 6)]);
@@ -248,7 +249,7 @@ fn a_list_holds_while_bodies_fly() {
     assert!(contact.rebuilds() - first > far, "none where they met");
 }
 
-/// Scattered points with volumes from 1 to 5 times the least.
+/// Scattered points with volumes from 1 to 5 times the smallest.
 #[test]
 fn unequal_volumes() {
     let mut random = Random(8);

@@ -1,5 +1,4 @@
-//! Cracks sever whole bonds: against exact arithmetic on whole numbers, wherever tips lie and in whichever
-//! order ends are given.
+//! Bonds severed by cracks, against exact integer arithmetic, for any position of tips and order of ends.
 
 use crate::bodies::{Body, Built, MODULUS, Random, fit, forces, norm, stretch_range};
 use peri::bonds::{
@@ -36,8 +35,7 @@ fn crosses<const D: usize>(a: Whole<D>, b: Whole<D>, corner: Whole<D>, edges: &[
     })
 }
 
-/// Checks both representations of a box of cells, its cracks given in quarters of the spacing; every bond,
-/// from both ends.
+/// Lattice and cloud of a box of cells with cracks in quarters of the spacing: every bond from both ends.
 fn check<const D: usize>(
     cells: [usize; D],
     (spacing, origin): (f64, f64),
@@ -125,7 +123,7 @@ proptest! {
 }
 
 /// A sheet of 24 × 60 mm with a crack from (0, 30) to (6, 30) mm: 192 directed bonds cross it and 12 pass
-/// through its tip, of which rounding used to take 10, and forces did not sum to zero.
+/// through its tip, which must all stay for forces to sum to zero.
 #[test]
 fn a_tip_on_bond_lines() {
     let body = Body::<2>::solid([24, 60], 1e-3, 3.015);

@@ -12,7 +12,7 @@ use std::f64::consts::PI;
 
 pub const DENSITY: f64 = 2.3;
 
-/// Runs to the end without callbacks.
+/// Runs to the end.
 pub fn run<const D: usize>(
     solver: &VelocityVerlet,
     bonds: &mut dyn Bonds<D>,
@@ -55,8 +55,8 @@ fn one_particle() {
     }
 }
 
-/// A particle that only damping slows: v = v₀(1 − ½cΔt)ⁿ/(1 + ½cΔt)ⁿ, to second order v₀e^(−ct), and what it
-/// loses is damped.
+/// A particle slowed by damping only: v = v₀(1 − ½cΔt)ⁿ/(1 + ½cΔt)ⁿ, to second order v₀e^(−ct), and the lost
+/// energy counts as damped.
 #[test]
 fn damping_slows() {
     let law = Law::Linear.build(1.0, 1.0, false).unwrap();
@@ -81,7 +81,7 @@ fn damping_slows() {
     }
 }
 
-/// A body of which every component is held: it follows the ramp, and the supports' work is what it stores.
+/// A body with all components prescribed follows the ramp and stores the work of the supports.
 #[test]
 fn fully_held() {
     let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
@@ -193,7 +193,7 @@ fn energies_balance() {
         let worst = state.history.iter().map(|r| error(r).abs()).fold(0.0, f64::max) / scale;
         eprintln!(
             "step {part} of critical, damping {damping}, {} broken: work {:.3e}, kinetic {:.3e}, stored \
-            {:.3e}, \
+             {:.3e}, \
              released {:.3e}, damped {:.3e} J; off by {worst:.1e}",
             last.broken, last.work, last.kinetic, last.stored, last.released, last.damped
         );
@@ -214,11 +214,11 @@ fn energies_balance() {
     }
 }
 
-/// Conserved quantities of a state: momentum, angular momentum about the origin (xy), energies.
+/// Returns conserved quantities of a state: momentum, angular momentum about the origin (xy), energies.
 struct Conserved {
     momentum: [f64; 2],
     spin: f64,
-    /// ½ρ(v² − ¼Δt²a²): with the stored energy, what the method conserves exactly where forces are linear.
+    /// Energy ½ρ(v² − ¼Δt²a²); its sum with the stored energy is exactly conserved for linear forces.
     kinetic: f64,
 }
 
@@ -238,7 +238,7 @@ fn conserved(bonds: &dyn Bonds<2>, state: &State<2>) -> Conserved {
     sum
 }
 
-/// Random velocities without momentum that strain bonds by about `strain`.
+/// Returns random velocities without momentum that strain bonds by about `strain`.
 fn shake(bonds: &dyn Bonds<2>, strain: f64, state: &mut State<2>) {
     let particles = bonds.particles();
     // at the frequency √(kθ…) of a bond the amplitude v/ω is strain·spacing
@@ -251,7 +251,7 @@ fn shake(bonds: &dyn Bonds<2>, strain: f64, state: &mut State<2>) {
     }
 }
 
-/// 1e5 steps of a small body that is shaken: no drift of the energy, momentum or spin.
+/// A shaken small body has no drift of energy, momentum or spin in 1e5 steps.
 #[test]
 fn energy_does_not_drift() {
     let law = Law::ChainOffset.build(100.0, 1200.0, true).unwrap();
@@ -314,7 +314,7 @@ fn energy_does_not_drift() {
     }
 }
 
-/// A body turned by 90° in steps of 1° bears no force and no stress; one that spins keeps energy, momentum
+/// A body rotated by 90° in steps of 1° has no forces and stresses; a spinning one conserves energy, momentum
 /// and spin.
 #[test]
 fn rigid_rotation() {
@@ -373,7 +373,7 @@ fn rigid_rotation() {
         state.history.iter().map(|r| ((r.kinetic + r.stored) / r.work - 1.0).abs()).fold(0.0, f64::max);
     eprintln!(
         "one free turn in {} steps: momentum {moved:.1e}, spin {turned:.1e}, energy {energy:.1e}, stretch \
-        {:.5}",
+         {:.5}",
         state.counts.total_iterations,
         state.history.last().unwrap().largest_stretch
     );

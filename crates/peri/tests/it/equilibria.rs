@@ -1,5 +1,5 @@
-//! Loads without an equilibrium: bodies torn by a force, free bodies, and prescribed displacements that press
-//! a body through itself.
+//! Loads without equilibrium: bodies torn by a force, free bodies, prescribed displacements that press a body
+//! through itself.
 
 use crate::bodies::{Body, MODULUS, hold};
 use harness::case::Fault;
@@ -60,8 +60,8 @@ fn solved(
     (result, state)
 }
 
-/// A single bond of the linear law, f = 2·3kθ(λ − 1)V²: the steps below the force at the critical stretch are
-/// rows, the next ends the run.
+/// A single linear bond, f = 2·3kθ(λ − 1)V²: steps below the force at the critical stretch are rows, the next
+/// one ends the run.
 #[test]
 fn a_bond_holds_up_to_its_strength() {
     let strength = 6.0 * MODULUS * 0.2 * 0.01 * 0.01;
@@ -84,8 +84,8 @@ fn a_bond_holds_up_to_its_strength() {
     }
 }
 
-/// The strip under a growing force, by both methods and both policies: a peak within a step of that under a
-/// growing displacement, then the error, with the last finished step in the state.
+/// A strip under a growing force, by both methods and both policies: the peak is within a step of that under
+/// a growing displacement; then the error, with the last finished step in the state.
 #[test]
 fn torn_by_a_force() {
     let steps = 24;
@@ -138,8 +138,8 @@ fn torn_by_a_force() {
     }
 }
 
-/// Refuses an unsupported body before any iteration, along the axis that is missing; held along it or
-/// balanced, it is solved.
+/// A body without supports along an axis is refused before any iteration; with a support along it or balanced
+/// loads it is solved.
 #[test]
 fn free_bodies_under_forces() {
     for (held, force, missing) in [
@@ -170,7 +170,7 @@ fn free_bodies_under_forces() {
     solved(&mut bonds, &loads, &[1.0], None, &Lbfgs::default()).0.unwrap();
 }
 
-/// Two blocks a gap apart: forces are judged part by part, and contact may hold a part that presses on
+/// Two blocks with a gap: supports are judged for each part, and contact may hold a part that presses on
 /// another.
 #[test]
 fn parts_and_stops() {
@@ -197,9 +197,8 @@ fn parts_and_stops() {
     );
 }
 
-/// Refuses a side moved past the other, in one step or many, in all components or one, and a region turned
-/// inside out; accepts similar but valid cases: half the height, a punch through a ring, a part turned by a
-/// right angle.
+/// A side moved past the other, in one step or many, with all components or one, and a region turned inside
+/// out are refused; half the height, a punch through a ring, and a part rotated by a right angle are not.
 #[test]
 fn bodies_crushed_through_themselves() {
     let cube = || Body::<3>::solid([6, 6, 10], 0.1, 3.015).build().lattice;

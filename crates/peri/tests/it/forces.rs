@@ -1,11 +1,11 @@
-//! The lattice path, the cloud path and a plain loop over all pairs give the same forces.
+//! Forces of the lattice path, the cloud path and a plain loop over all pairs agree.
 
 use crate::bodies::{Body, Random, distance, fit, forces, laws, norm, rms, scatter, stretch_range};
 use peri::bonds::{BodyGeometry, BondDamage, BondForces, Bonds, force};
 use peri::field::Field;
 use peri::potential::{KernelFit, StretchRange};
 
-/// The forces of pieces have the bits of those of work items.
+/// Forces of pieces have the bits of forces of work items.
 fn in_pieces<const D: usize>(bonds: &dyn Bonds<D>, u: &Field<D>) {
     let (mut whole, piece) = (Field::zeros(bonds.sites()), bonds.piece());
     force(bonds, u, &mut whole);
@@ -19,8 +19,8 @@ fn in_pieces<const D: usize>(bonds: &dyn Bonds<D>, u: &Field<D>) {
     }
 }
 
-/// Compares forces in mixed precision with those in double precision: each bond, and each tracked stretch,
-/// has the rounding error of single precision.
+/// Forces in mixed precision agree with double precision to the rounding of single precision in each bond,
+/// and so does the range of stretches.
 fn in_mixed_precision<const D: usize>(
     body: &Body<D>,
     fit: &KernelFit,
@@ -59,7 +59,7 @@ fn in_mixed_precision<const D: usize>(
     }
 }
 
-/// Every law on one body: both paths against each other and against the plain loop.
+/// Both paths agree with each other and with a plain loop, for every law on one body.
 fn compare<const D: usize>(body: &Body<D>, size: f64, name: &str) {
     let mut built = body.build();
     let mut copied = body.build().cloud;
@@ -95,7 +95,7 @@ fn compare<const D: usize>(body: &Body<D>, size: f64, name: &str) {
             assert!(
                 error <= allowed,
                 "{name}, {}, particle {particle} at {:?}: {found:?} against {exact:?}, off by {:.1e} of \
-                {:.1e}",
+                 {:.1e}",
                 law.name(),
                 built.points[particle],
                 error,
@@ -128,8 +128,8 @@ fn paths_agree_in_space() {
     }
 }
 
-/// Errors of mixed precision in a moved body: single precision resolves a displacement of n spacings to
-/// n·2⁻²⁴ of them. A law over stretches too wide for single precision stays in double precision.
+/// Errors of mixed precision grow with the displacement: single precision rounds n spacings to n·2⁻²⁴. A law
+/// over a range of stretches that is too wide for single precision stays in double precision.
 #[test]
 fn limits_of_mixed_precision() {
     let built = Body::<3>::solid([9, 8, 7], 0.1, 3.015).build();
@@ -158,7 +158,7 @@ fn limits_of_mixed_precision() {
     assert_eq!(error_at(&mut bonds, [0.1, 3.0], 0.0), 0.0);
 }
 
-/// A law that only the table represents runs the plain loops of both paths.
+/// A law that only a table represents uses the plain loops of both paths.
 #[test]
 fn paths_agree_on_a_tabulated_law() {
     let body = Body::<2>::damaged([15, 14], 0.1, 3.015);
@@ -183,9 +183,9 @@ fn paths_agree_on_a_tabulated_law() {
     assert!(apart <= 1e-7, "{apart:.1e}");
 }
 
-/// Instead of Miri, which cannot run the vector kernels: bodies whose particles touch every edge of the
-/// storage, at sizes that no tile of 16 sites or group of 8 neighbours divides. (By hand, valgrind 3.19 runs
-/// this test without a complaint; it does not know AVX-512, so probably on the 256-bit kernels.)
+/// Bodies whose particles touch every edge of the storage, at sizes that no tile of 16 sites or group of 8
+/// neighbours divides, in place of Miri, which cannot run vector kernels. (Valgrind 3.19 runs this test
+/// without errors, probably on the 256-bit kernels.)
 #[test]
 fn thin_bodies_of_any_length() {
     let law = peri::potential::Law::ChainOffset.build(720.0, 1200.0, false).unwrap();

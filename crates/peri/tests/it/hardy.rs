@@ -1,5 +1,5 @@
-//! Measures whose weights sum to 1: the patch test up to free edges, bonds shared out whole, the balance of
-//! momentum, and the definitions written out here.
+//! Stress measures with weights that sum to 1: patch test up to free edges, complete distribution of bonds,
+//! balance of momentum, and reference definitions.
 
 use crate::bodies::{Body, BondPair, Built, MODULUS, Random, fit, norm, scatter, stretch_range};
 use peri::bonds::{BodyGeometry, BondDamage, BondForces, Overstretched};
@@ -43,15 +43,15 @@ fn on_lattice<const D: usize>(
     piola_on_lattice(&built.lattice, &state, measure, BallVolume::Particles)
 }
 
-/// A strain without symmetry.
+/// Strain without symmetry.
 fn strained<const D: usize>(points: &[[f64; D]]) -> Vec<[f64; D]> {
     let h = |a: usize, b: usize| 0.01 * (1.0 + 0.7 * a as f64 - 0.9 * b as f64) / (1.0 + (a * b) as f64);
     points.iter().map(|x| std::array::from_fn(|a| (0..D).map(|b| h(a, b) * x[b]).sum())).collect()
 }
 
-/// Checks that in a body with a hole every particle, at edges, corners and the hole, has the stress of its
-/// own bonds if none is missing; the greatest error by `hardy`.
-fn patch<const D: usize>(ratio: f64, cells: [usize; D], measures: &[StressMethod]) -> f64 {
+/// Every particle of a body with a hole, also at edges and corners, has the stress of a complete family;
+/// returns the largest error of `hardy`.
+fn patch<const D: usize>(ratio: f64, cells: [usize; D], measures: &[Measure]) -> f64 {
     let mut body = Body::<D>::solid(cells, 1.0, ratio);
     let far = 2.0 * ratio;
     let centre = cells.map(|c| c as f64 - far - 1.5);
@@ -101,8 +101,8 @@ fn any_strain_is_exact_up_to_free_edges() {
     evidence::at_most("patch test of hardy up to free edges", worst, 1e-13);
 }
 
-/// `patch_test.py`: σ₁₁ in rows 0–3 below an edge along x over that inside, uniform strain of uniaxial stress
-/// along x.
+/// Results of `patch_test.py`: σ₁₁ in rows 0–3 below an edge along x over that inside, for the uniform strain
+/// of uniaxial stress along x.
 #[test]
 fn rows_below_a_free_edge() {
     let built = Body::<2>::solid([41, 30], 1.0, 3.015).build();
@@ -133,8 +133,8 @@ fn rows_below_a_free_edge() {
     assert!((mixed[0] - 0.897).abs() < 6e-4 && (mixed[1] - 1.0).abs() < 1e-12, "{mixed:?}");
 }
 
-/// Σ P V over all particles is Σ f ⊗ ξ over all bonds: every bond of an inner particle is shared out whole,
-/// and a broken one leaves exactly its own part, having counted with no force.
+/// Σ P V over all particles is Σ f ⊗ ξ over all bonds: bonds of inner particles are distributed completely,
+/// and a broken bond removes exactly its part.
 #[test]
 fn a_broken_bond_counts_with_no_force() {
     let body = Body::<2>::solid([27, 27], 1.0, 3.015);
@@ -177,7 +177,8 @@ fn a_broken_bond_counts_with_no_force() {
     }
 }
 
-/// A cloud: the same inside a regular one, and in any one the sum over the particles is that over the bonds.
+/// A regular cloud has the stresses of the lattice, and in any cloud the sum over particles is that over
+/// bonds.
 #[test]
 fn clouds_share_bonds_out() {
     let built = Body::<2>::solid([25, 22], 1.0, 3.015).build();
@@ -207,8 +208,8 @@ fn clouds_share_bonds_out() {
     }
 }
 
-/// Bodies, forces of their bonds, and their displacement, smooth and not uniform.
-fn smooth() -> (Body<2>, Built<2>, Vec<BondPair<2>>, Vec<[f64; 2]>) {
+/// Returns bodies, forces of their bonds, and a smooth displacement that is not uniform.
+fn smooth() -> (Body<2>, Built<2>, Vec<Pair<2>>, Vec<[f64; 2]>) {
     let body = Body::<2>::solid([29, 29], 1.0, 3.015);
     let built = body.build();
     let u = built
@@ -223,7 +224,8 @@ fn smooth() -> (Body<2>, Built<2>, Vec<BondPair<2>>, Vec<[f64; 2]>) {
     (body, built, pairs, u)
 }
 
-/// Σ f ⊗ ξ ∫₀¹ φ(X_I + αξ − X) dα over all pairs, the integral by `steps` midpoints: Eqs (2.14), (2.15).
+/// Returns Σ f ⊗ ξ ∫₀¹ φ(X_I + αξ − X) dα over all pairs, the integral by `steps` midpoints: Eqs (2.14),
+/// (2.15).
 fn by_definition(
     pairs: &[BondPair<2>],
     points: &[[f64; 2]],
@@ -255,14 +257,14 @@ fn by_definition(
     sum
 }
 
-/// A window in the plane.
+/// Window function in the plane.
 type Shape2 = fn([f64; 2]) -> f64;
 
 fn ball(x: [f64; 2]) -> f64 {
     f64::from(u8::from(norm(x) < 3.015)) / (std::f64::consts::PI * 3.015_f64.powi(2))
 }
 
-/// Normal distribution with a third of the horizon, cut off there, where e^(−9/2) of it is left.
+/// Normal distribution with a standard deviation of a third of the horizon, truncated there at e^(−9/2).
 fn gaussian(x: [f64; 2]) -> f64 {
     let variance = (3.015_f64 / 3.0).powi(2);
     let inside = f64::from(u8::from(norm(x) < 3.015));
@@ -281,7 +283,7 @@ fn hat(x: [f64; 2]) -> f64 {
     (1.0 - x[0].abs()).max(0.0) * (1.0 - x[1].abs()).max(0.0)
 }
 
-/// Particle by particle against the definition, the windows averaged over a cell by 16² points here.
+/// Every particle agrees with the definition, with windows averaged over a cell by 16² points.
 #[test]
 fn measures_are_their_definitions() {
     let (_, built, pairs, u) = smooth();
@@ -311,8 +313,8 @@ fn measures_are_their_definitions() {
     }
 }
 
-/// div P is the window's average of the force density: Eqs (2.11), (2.12) for the cell's window of Lehoucq
-/// and Silling, and for the spline.
+/// div P is the average of the force density by the window: Eqs (2.11), (2.12) for the cell's window of
+/// Lehoucq and Silling, and for the spline.
 #[test]
 fn divergence_is_the_average_over_the_window() {
     let (_, built, pairs, u) = smooth();
@@ -345,8 +347,8 @@ fn divergence_is_the_average_over_the_window() {
     }
 }
 
-/// Fields of one body do not depend on what lies in memory beside its rows: a body in a larger box of cells
-/// has the same.
+/// Fields do not depend on memory beside the rows of a body: a body in a larger box of cells has equal
+/// fields.
 #[test]
 fn rows_do_not_reach_into_each_other() {
     let (_, fit) = linear([0.5, 2.0]);
@@ -367,7 +369,7 @@ fn rows_do_not_reach_into_each_other() {
     }
 }
 
-/// Work items have fixed sums: the bits do not depend on threads.
+/// Bits do not depend on threads, because work items have fixed sums.
 #[test]
 fn bits_do_not_depend_on_threads() {
     let body = Body::<2>::damaged([60, 70], 0.1, 3.015);

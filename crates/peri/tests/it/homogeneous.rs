@@ -1,4 +1,4 @@
-//! Homogeneous strains through the whole chain of lattice, law, relaxation and stress.
+//! Homogeneous strains in lattice, law, relaxation and stress together.
 
 use crate::bodies::{Body, Built, Random, fit, hold, relax};
 use peri::bonds::{BodyGeometry, Bonds, Stencil};
@@ -8,8 +8,8 @@ use peri::potential::{BondPotential, Law};
 use peri::solver::{DynamicRelaxation, State};
 use peri::stress::{BallVolume, StressInput, StressMethod, SurfaceCompensation, piola_on_lattice};
 
-/// Three layers all around move affinely: the inside follows exactly, since every inner particle has its
-/// whole family.
+/// Three affinely moved layers around a body make the inside follow exactly, because every inner particle has
+/// a complete family.
 fn check_affine<const D: usize>(cells: [usize; D], name: &str) {
     let body = Body::<D>::solid(cells, 0.1, 3.015);
     let mut built = body.build();
@@ -60,8 +60,8 @@ fn an_affine_boundary_gives_the_affine_field() {
     check_affine([12, 11, 10], "block");
 }
 
-/// A strip between rollers: the middle, far from the free edges and six widths from the ends' missing bonds,
-/// is the lattice under uniaxial stress.
+/// The middle of a strip between rollers, far from free edges and six widths from the ends, is a lattice
+/// under uniaxial stress.
 #[test]
 fn a_sheet_between_rollers_is_in_uniaxial_stress() {
     let cells = [201, 31];
@@ -101,7 +101,7 @@ fn a_sheet_between_rollers_is_in_uniaxial_stress() {
     }
 }
 
-/// Stretches along the axes between a particle and the next one.
+/// Returns the stretches along the axes between a particle and the next one.
 fn local_stretches<const D: usize>(built: &Built<D>, state: &State<D>, particle: usize) -> [f64; D] {
     std::array::from_fn(|d| {
         let mut there = built.points[particle];
@@ -112,7 +112,7 @@ fn local_stretches<const D: usize>(built: &Built<D>, state: &State<D>, particle:
     })
 }
 
-/// P11/kθ and P22/kθ of the cubic lattice under F = diag(a, b, b).
+/// Returns P11/kθ and P22/kθ of the cubic lattice under F = diag(a, b, b).
 fn block_stress(law: &dyn BondPotential, ratio: f64, a: f64, b: f64) -> [f64; 2] {
     let stencil = Stencil::<3>::new(ratio);
     let mut stress = [0.0; 2];

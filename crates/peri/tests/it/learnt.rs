@@ -1,5 +1,4 @@
-//! Laws learnt from data as solids: the battery of all materials, homogeneous deformations, flags, and
-//! refusals.
+//! Learnt laws as solids: checks of all materials, homogeneous deformations, flags, refused laws.
 
 use crate::bodies::{Body, scatter};
 use crate::materials::battery;
@@ -13,7 +12,7 @@ use peri::field::Field;
 use peri::material::{
     BodyTensor, Correspondence, Deformation, Material, NonlocalSolid, PointLaw, Pointwise, SolverMaterial,
 };
-use peri::program::run::{Finished, Peri, run};
+use peri::program::run::{FinishedScene, Peri, run};
 use peri::program::scene::{self, Scene};
 use polycore::constitutive::network::Activation::Softplus;
 use polycore::constitutive::surrogate::{Header, Kind, Softening, Surrogate, Symmetry};
@@ -21,14 +20,15 @@ use polycore::constitutive::{Error, Law, Prediction, Workspace};
 use polycore::tensor::voigt::{self, Voigt, Voigt6x6};
 use std::path::Path;
 
-/// The law of `cases/ch5/learnt-sheet`.
+/// Loads the law of `cases/ch5/learnt-sheet`.
 const LAW: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../cases/ch5/learnt-sheet/law.safetensors");
 
 fn trained() -> Surrogate {
     Surrogate::read(LAW).unwrap()
 }
 
-/// A polyconvex orthotropic energy of random weights, in axes turned about z and by `tilt` about x.
+/// Returns a polyconvex orthotropic energy with random weights, in axes rotated about z and by `tilt` about
+/// x.
 fn orthotropic(tilt: f64) -> Surrogate {
     let turn = nalgebra::Rotation3::from_euler_angles(tilt, 0.0, 0.6);
     let axes = [0, 1, 2].map(|i| [0, 1, 2].map(|j| turn[(j, i)]));
@@ -56,7 +56,7 @@ fn learnt_laws_pass_the_battery() {
     at_most("learnt_stiffness_over_bound", greatest, 2.0);
 }
 
-/// C₃₃ without stress along z, by bisection.
+/// Returns C₃₃ without stress along z, by bisection.
 fn thickness(law: &Surrogate, mut c: Voigt) -> f64 {
     let memory = &mut Workspace::default();
     let (mut low, mut high) = (0.2, 3.0);
@@ -67,8 +67,8 @@ fn thickness(law: &Surrogate, mut c: Voigt) -> f64 {
     c[2]
 }
 
-/// Largest distance of P = FS from the law's own in any particle, over its norm, and the largest force at
-/// rest over μV/Δx.
+/// Returns the largest distance of P = FS from that of the law in any particle, over its norm, and the
+/// largest force at rest over μV/Δx.
 fn distance<const D: usize>(
     law: &Surrogate,
     space: Space,
@@ -169,7 +169,7 @@ shapes = [{{ add = \"box\", min = [\"0 mm\", \"0 mm\"], max = [\"16 mm\", \"6 mm
     )
 }
 
-fn solve(text: &str, output: &Path) -> Finished {
+fn solve(text: &str, output: &Path) -> FinishedScene {
     let source = Source::new("scene.toml", text);
     let scene = source.parse::<Scene>().unwrap_or_else(|error| panic!("{}", error.render()));
     let mut own = Run::new(const { &Peri::PROGRAM }, &source, Options::new(output));

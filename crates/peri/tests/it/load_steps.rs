@@ -1,4 +1,4 @@
-//! Load steps that are cut where bonds break, and loads that follow a response which snaps back.
+//! Load steps bisected where bonds break, and loads that follow a snap-back.
 
 use crate::bodies::hold;
 use peri::bonds::{BodyGeometry, LatticeBonds, VolumeCorrection};
@@ -30,7 +30,7 @@ pub fn dent(spacing: f64, notch: f64) -> (LatticeBonds<2>, Loads<2>, Box<dyn Bon
     (bonds, loads, law, modulus)
 }
 
-/// The sheet of `notch` torn in `steps`.
+/// Tears the sheet with notches of `notch` in `steps`.
 fn torn(notch: f64, steps: u32, refine: usize, snap_back: bool) -> State<2> {
     let (mut bonds, loads, law, modulus) = dent(4e-3, notch);
     let factors: Vec<f64> = (1..=steps).map(|k| f64::from(k) / f64::from(steps)).collect();
@@ -43,8 +43,8 @@ fn torn(notch: f64, steps: u32, refine: usize, snap_back: bool) -> State<2> {
     state
 }
 
-/// Ten steps, cut to a 64th where bonds would break, against 640: the same rows around the first break, the
-/// same peak, the same number of broken bonds.
+/// Ten steps, bisected to a 64th where bonds break, agree with 640 steps: rows around the first break, peak,
+/// number of broken bonds.
 #[test]
 fn cut_steps_find_what_short_ones_do() {
     let (cut, short) = (torn(0.02, 10, 64, false), torn(0.02, 640, 1, false));
@@ -72,8 +72,8 @@ fn cut_steps_find_what_short_ones_do() {
     );
 }
 
-/// The sheet that snaps back: the peaks of sheets that had longer notches from the start lie on its way, and
-/// what breaks releases the energy of the bonds across the ligament at the critical stretch.
+/// The path of a sheet that snaps back contains the peaks of sheets with longer notches, and broken bonds
+/// release the energy of the bonds across the ligament at the critical stretch.
 #[test]
 fn snap_back_follows_equilibria() {
     let (steps, refine) = (20, 64);

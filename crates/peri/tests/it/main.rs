@@ -15,6 +15,7 @@ mod fields;
 mod filter;
 mod forces;
 mod friction;
+mod friction_equilibria;
 mod hardy;
 mod homogeneous;
 mod impact;
@@ -38,6 +39,7 @@ mod rotations;
 #[path = "../../examples/rubber_bearing.rs"]
 mod rubber_bearing;
 mod softening;
+mod solid_kernels;
 mod solids;
 mod spectra;
 mod stress;

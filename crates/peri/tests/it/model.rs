@@ -1,4 +1,4 @@
-//! Models in a few lines are what their parts are by hand.
+//! Models in a few lines agree with models built by hand.
 
 use crate::linear_solid::LinearSolid;
 use peri::Error;
@@ -20,7 +20,7 @@ fn sheet() -> Body<2> {
     Body::lattice(shape, 2e-3).plane_stress(1e-3).crack(Cut::segment(CRACK[0], CRACK[1]))
 }
 
-/// The cracked sheet, torn in three steps, by hand.
+/// Tears the cracked sheet in three steps, built by hand.
 fn by_hand() -> (LatticeBonds<2>, State<2>) {
     let body = [Operation::Add(Shape::Box { min: [0.0; 2], max: [24e-3, 40e-3] })];
     let crack = Cut { corner: CRACK[0], edges: [[8e-3, 0.0], [0.0; 2]] };
@@ -68,7 +68,7 @@ fn a_model_is_its_parts() {
     assert!(stress.len() == particles && stress.iter().flatten().flatten().all(|x| x.is_finite()));
 }
 
-/// Methods continue from one another: further load steps, then motion.
+/// A method continues the state of another: further load steps, then motion.
 #[test]
 fn a_simulation_goes_on() {
     let model = Model::new(sheet(), Rubber::new(Law::Linear, 1e6));
@@ -86,7 +86,7 @@ fn a_simulation_goes_on() {
     assert_eq!(simulation.history().len(), 2);
 }
 
-/// A material from outside the crate, and a crack that opens as it must.
+/// A crack opens correctly with a material from outside the crate.
 #[test]
 fn any_material() {
     let solid = LinearSolid { bulk: 9e6.into(), shear: 1e6.into() };
@@ -102,8 +102,8 @@ fn any_material() {
     assert!(opening(1e-3) > 3.0 * opening(23e-3), "{} {}", opening(1e-3), opening(23e-3));
 }
 
-/// A law of the caller, whatever its scale, is the named one of the same shape; so is the stretch of a
-/// fracture energy.
+/// A law of the caller at any scale equals the named law of its shape, and so does the stretch of a fracture
+/// energy.
 #[test]
 fn a_law_of_the_caller() {
     struct Springs(f64);

@@ -1,5 +1,5 @@
-//! The time step of explicit dynamics of solids: a bound of the greatest frequency at any stretch and with
-//! bonds broken, and steps that follow it through stretching, tearing, crushing and back.
+//! Time step of explicit dynamics of solids: a bound of the largest frequency at any stretch and with broken
+//! bonds, and steps that follow it through stretching, tearing, crushing and back.
 
 use crate::bodies::{Random, hold};
 use evidence::{at_most, within};
@@ -53,8 +53,8 @@ fn some<const D: usize>(bonds: &dyn Bonds<D>, part: f64, random: &mut Random) ->
     list
 }
 
-/// The bound over ω², which the Lanczos iteration finds to 1 %, at stretches of 1 to 3 with 0, 20 and 50 % of
-/// the bonds broken and with particles displaced at random: least and greatest.
+/// Returns the smallest and the largest bound over ω² (Lanczos iteration to 1 %), at stretches of 1 to 3 with
+/// 0, 20 and 50 % of the bonds broken and random displacements.
 fn tightness<const D: usize, M: Material<D> + 'static>(
     cells: [usize; D],
     material: impl Fn() -> M,
@@ -92,9 +92,9 @@ fn tightness<const D: usize, M: Material<D> + 'static>(
     found
 }
 
-/// Steps are made for at least 1.3 ω² (the margin), and not much more: 16 times only in plane stress of
-/// finite K, where the law's own bound does not follow the thickness, and 40 times for the network, whose
-/// bound is that of Gershgorin with the stiffest neighbour.
+/// The bound is at least 1.3 ω² (the margin), and not much more: 16 times in plane stress of finite K, where
+/// the bound of the law ignores the thickness, and 40 times for the network, with Gershgorin's bound by the
+/// stiffest neighbour.
 #[test]
 fn frequencies_are_bounded_at_any_stretch_and_damage() {
     let judge = |name: &str, limit: f64, [least, most]: [f64; 2]| {
@@ -114,8 +114,8 @@ fn frequencies_are_bounded_at_any_stretch_and_damage() {
     judge("network_cube_2", 45.0, tightness(cube, || Affine::new(1.0, 25.0, 5.0 / 3.0).unwrap(), 0.5));
 }
 
-/// Pulls to three times the length within two passes of a wave, holds, and lets go: energies stay closed and
-/// the step comes back.
+/// Stretching to three times the length within two wave passes, holding and releasing keeps the energy
+/// balance and restores the step.
 fn pulled<const D: usize, M: Material<D> + 'static>(name: &str, cells: [usize; D], material: M) {
     let mut bonds = block(cells);
     let length = cells[0] as f64;
@@ -150,7 +150,7 @@ fn pulled<const D: usize, M: Material<D> + 'static>(name: &str, cells: [usize; D
     let most = state.history.iter().map(|row| row.largest_stretch).fold(0.0, f64::max);
     println!(
         "{name}: {} steps, {} forces, {} bounds, {} searches, stretch {most:.2}, energies off by \
-        {worst:.1e}, step {:.4} of {:.4} at rest",
+         {worst:.1e}, step {:.4} of {:.4} at rest",
         state.counts.total_iterations,
         state.counts.evaluations,
         state.motion.limits.bounds,
@@ -176,7 +176,7 @@ fn steps_follow_stretches_and_come_back() {
     pulled("network", [12, 5, 5], Affine::new(1.0, 25.0, 5.0 / 3.0).unwrap());
 }
 
-/// A notched sheet, torn apart within three passes of a wave without contact: fragments crush and tumble.
+/// Tears a notched sheet within three wave passes without contact, so that fragments are crushed and rotate.
 fn torn(pause: Option<u64>) -> State<2> {
     let build = || {
         let body = [Operation::Add(Shape::Box { min: [0.0; 2], max: [20.0, 26.0] })];
@@ -223,7 +223,7 @@ fn torn_solids_keep_a_stable_step() {
     let off = (last.work - last.stored - last.kinetic - last.damped - last.released).abs() / last.work;
     println!(
         "torn: {} steps, {} forces, {} bounds, {} searches, {} broken, energies off by {off:.1e} of {:.3}, \
-        step {:.2e} of {:.2e} at rest",
+         step {:.2e} of {:.2e} at rest",
         one.counts.total_iterations,
         one.counts.evaluations,
         one.motion.limits.bounds,

@@ -1,4 +1,4 @@
-//! Dynamic relaxation: the DENT specimen of `dent.py`, work counts, the same bits for any number of threads.
+//! Dynamic relaxation: the DENT specimen of `dent.py`, work counts, equal bits for any number of threads.
 
 use crate::bodies::{Body, hold, relax};
 use peri::bonds::{BodyGeometry, Bonds, LatticeBonds, VolumeCorrection};
@@ -51,7 +51,7 @@ impl Dent {
         state
     }
 
-    /// Mean of both grips' reactions, N.
+    /// Returns the mean reaction of both grips, N.
     fn pull(&self, state: &State<2>) -> f64 {
         let volume = self.spacing * self.spacing * THICKNESS;
         let each = self.bonds.particles().iter().map(|&s| {
@@ -99,7 +99,7 @@ fn dent_at_two_millimetres() {
     }
 }
 
-/// Four work items, so that threads have something to mix up; a lattice and a cloud.
+/// Bits do not depend on threads, with four work items, on a lattice and a cloud.
 #[test]
 fn bits_do_not_depend_on_threads() {
     let run = |threads: usize, cloud: bool| {
@@ -127,7 +127,7 @@ fn bits_do_not_depend_on_threads() {
     }
 }
 
-/// A notched sheet pulled by a tenth under every law that is stress-free.
+/// A notched sheet pulled by a tenth, under every stress-free law.
 #[test]
 fn every_stress_free_law_converges() {
     let mut built = Body::<2>::damaged([30, 24], 0.1, RATIO).build();

@@ -1,5 +1,5 @@
 //! Stress measures against independent tables (`stress_patch.csv`, `stress_surface.csv`, made by
-//! `s3_stress.py`), against the sum over all bonds written out here, and against the balance of momentum.
+//! `s3_stress.py`), against reference sums over all bonds, and against the balance of momentum.
 
 use crate::bodies::{Body, BondPair, Built, MODULUS, Random, fit, norm, scatter, stretch_range};
 use peri::bonds::{BodyGeometry, BondForces, LatticeBonds};
@@ -12,8 +12,8 @@ use peri::stress::{
 };
 use peri::stress::{cauchy, deformation_gradients, piola_in_cloud, piola_on_lattice};
 
-/// Strain at which tables of the linear theory are compared: the bonds' own nonlinearity is of this order, so
-/// 5 of it is the tolerance on stresses over E ε.
+/// Strain for comparison with tables of linear theory: bonds are nonlinear to this order, so the tolerance on
+/// stresses over E ε is 5 times it.
 const STRAIN: f64 = 1e-6;
 const TOLERANCE: f64 = 5.0 * STRAIN;
 
@@ -21,14 +21,14 @@ fn space(dimension: usize) -> Space {
     if dimension == 2 { Space::PlaneStress } else { Space::Solid }
 }
 
-/// u = ε (x, −νy, −νz): uniaxial stress E ε of the continuum.
+/// Returns u = ε (x, −νy, −νz): uniaxial stress E ε of the continuum.
 fn uniaxial<const D: usize>(points: &[[f64; D]]) -> Vec<[f64; D]> {
     let nu = poisson_ratio(space(D));
     let ratio = |d: usize| if d == 0 { STRAIN } else { -nu * STRAIN };
     points.iter().map(|x| std::array::from_fn(|d| ratio(d) * x[d])).collect()
 }
 
-/// (σ11, σ22)/Eε of the particle at `cell` by both paths, the cloud only where asked.
+/// Returns (σ11, σ22)/Eε of the particle at `cell` by both paths, the cloud on request.
 fn measured<const D: usize>(
     built: &Built<D>,
     ratio: f64,
@@ -55,7 +55,7 @@ fn measured<const D: usize>(
     results
 }
 
-/// A body that holds everything within twice the horizon of its middle, and the particle there.
+/// Returns a body that contains twice the horizon around its middle, and the particle there.
 fn patch<const D: usize>(ratio: f64) -> (Built<D>, usize) {
     let side = 2 * (2.0 * ratio) as usize + 1;
     let built = Body::<D>::solid([side; D], 1.0, ratio).build();
@@ -134,8 +134,8 @@ fn patch_test_in_space() {
     check_patch::<3>(4.015, false);
 }
 
-/// m = 6.015 in space: the whole field takes minutes, so the middle's sum is written out with the library's
-/// bond function; the one-point measure costs little and runs.
+/// m = 6.015 in space: the whole field would take minutes, so the sum of the middle uses the bond function of
+/// the library; the one-point measure is cheap and runs.
 #[test]
 fn patch_test_in_space_at_a_large_horizon() {
     let ratio = 6.015;
@@ -172,8 +172,8 @@ fn patch_test_in_space_at_a_large_horizon() {
     }
 }
 
-/// Below a free surface, rows from 0: hardy over the whole ball, hardy over the ball inside the body,
-/// one-point.
+/// Returns stresses in rows below a free surface: hardy over the whole ball, hardy over the ball inside the
+/// body, one-point.
 fn check_surface<const D: usize>(ratio: f64, depth: usize, cells_tolerance: f64, rows: &[[f64; 3]]) {
     let width = 2 * (2.0 * ratio) as usize + 1;
     let mut cells = [width; D];
@@ -233,8 +233,8 @@ fn free_surface_in_space() {
     check_surface::<3>(3.015, 7, 1e-4, &rows);
 }
 
-/// The ball's volume inside the body by its share of particles: the same on both paths, in bodies of any
-/// thickness.
+/// The volume of the ball inside the body, by its share of particles, is equal on both paths, in bodies of
+/// any thickness.
 #[test]
 fn ball_inside_thin_bodies() {
     for width in [1, 3, 6, 20] {
@@ -263,8 +263,8 @@ fn ball_inside_thin_bodies() {
     }
 }
 
-/// P by definition: over all pairs, force ⊗ ξ × fraction of the bond inside the ball about `at`, over the
-/// ball's volume.
+/// Returns P by definition: over all pairs, force ⊗ ξ × fraction of the bond inside the ball about `at`, over
+/// the ball's volume.
 fn hardy_sum<const D: usize>(
     body: &Body<D>,
     points: &[[f64; D]],
@@ -292,9 +292,9 @@ fn hardy_sum<const D: usize>(
     sum.map(|row| row.map(|x| x / ball_volume(D, body.horizon())))
 }
 
-/// Random displacements, a hole, cracks and all corrections: particle by particle against the definition. The
-/// spacing is no power of two, so that both ends of a bond often lie at distances from the ball's centre that
-/// are equal up to rounding.
+/// Every particle agrees with the definition, with random displacements, a hole, cracks and all corrections.
+/// The spacing is no power of two, so that both ends of a bond often have equal distances from the centre of
+/// the ball up to rounding.
 fn check_definition<const D: usize>(cells: [usize; D], ratio: f64) {
     let body = Body::damaged(cells, 0.1, ratio);
     let built = body.build();
@@ -347,9 +347,8 @@ fn hardy_is_the_sum_over_all_crossing_bonds() {
     check_definition([3, 4, 27], 3.015);
 }
 
-/// div P(hardy) is the ball's average of the force density (formulation.md: to 1e-7 where the loads vary
-/// smoothly; asked here to 1e-5), for the field of `s3_stress.py`, at points off the lattice and at a
-/// particle.
+/// div P(hardy) is the average of the force density over the ball (to 1e-7 for smooth loads, tested to 1e-5),
+/// for the field of `s3_stress.py`, at points off the lattice and at a particle.
 #[test]
 fn divergence_is_the_average_force() {
     let body = Body::<2>::solid([29, 29], 1.0, 3.015);
@@ -393,8 +392,8 @@ fn divergence_is_the_average_force() {
     evidence::at_most("divergence of the stress by ball-share against the average force", worst, 1e-5);
 }
 
-/// The lattice sums deformation gradients by vectors, a cloud bond by bond: bodies with a hole, cracks and a
-/// volume correction.
+/// Deformation gradients of the lattice (by vectors) and of a cloud (by bonds) agree, with a hole, cracks and
+/// a volume correction.
 #[test]
 fn deformation_gradients_of_torn_bodies() {
     fn check<const D: usize>(cells: [usize; D]) {

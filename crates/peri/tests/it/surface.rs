@@ -12,7 +12,7 @@ use peri::stress::{
     BallVolume, StressInput, StressMethod, StressTensor, SurfaceCompensation, piola_on_lattice,
 };
 
-/// E ε/σ between (±400, 300) mm, and the largest σ11/σ beside the hole: hardy, one-point.
+/// Returns E ε/σ between (±400, 300) mm, and the largest σ11/σ beside the hole: hardy, one-point.
 fn plate(spacing: f64, volume: VolumeCorrection, surface: bool) -> [f64; 3] {
     let (half, ratio, thickness) = (0.5, 3.015, 0.01);
     let body = [
@@ -70,15 +70,15 @@ fn plate(spacing: f64, volume: VolumeCorrection, surface: bool) -> [f64; 3] {
     let one_point = largest(piola_on_lattice(&bonds, &loaded, StressMethod::OnePoint, BallVolume::Particles));
     eprintln!(
         "dx = {spacing}, {volume:?}, surface {surface}: strain {:.4}, hardy {hardy:.3}, one-point \
-        {one_point:.3}, {} its",
+         {one_point:.3}, {} its",
         strain / stress,
         state.counts.total_iterations
     );
     [strain / stress, hardy, one_point]
 }
 
-/// formulation.md: the correction takes the global modulus' error from 20.6 % to 3.4 %, volume factor on (as
-/// printed: ± 0.001); hardy 2.47 and one-point 2.64 at dx = 5 with the surface correction, volume factor off
+/// The correction reduces the error of the global modulus from 20.6 % to 3.4 %, with volume factor (printed
+/// digits: ± 0.001); hardy 2.47 and one-point 2.64 at dx = 5 with the surface correction, volume factor off
 /// (± 1 %).
 #[test]
 fn correction_on_the_plate() {
@@ -94,7 +94,7 @@ fn correction_on_the_plate() {
     );
 }
 
-/// formulation.md's table of the plate, dx = 10, nothing corrected: ± 1 %.
+/// Table of the plate, dx = 10, without corrections: ± 1 %.
 #[test]
 fn plate_without_corrections() {
     let [_, hardy, one_point] = plate(0.01, VolumeCorrection::None, false);

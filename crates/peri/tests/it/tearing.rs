@@ -1,6 +1,5 @@
-//! Fracture energies of bond laws: the lattice's bonds across a cut, against the sums of
-//! formulation-tearing.md (its tables and `fit.py`), the critical stretches of both conventions, the area of
-//! new cracks, and bonds that soften.
+//! Fracture energies of bond laws: bonds of the lattice across a cut, against independent sums, critical
+//! stretches of both conventions, the area of new cracks, and softening bonds.
 
 use evidence::near;
 use harness::scene::Source;
@@ -33,7 +32,7 @@ fn block(ratio: f64, layers: f64) -> LatticeBonds<3> {
     LatticeBonds::new(built, ratio, VolumeCorrection::None, &[]).unwrap()
 }
 
-/// N, κ and S of the tables of sections 1 and 2 (S of corrections: c over κ), to their printed digits.
+/// N, κ and S agree with the printed digits of independent tables (S of corrections: c over κ).
 #[test]
 fn bonds_across_a_cut() {
     use VolumeCorrection::{Linear, None as Full};
@@ -74,7 +73,7 @@ fn bonds_across_a_cut() {
     assert!(!thin.whole && thin.bonds < 122.0 && thin.bonds > 80.0, "{thin:?}");
 }
 
-/// A cloud of the same points has the same sums, its surface particles left out.
+/// A cloud of the same points has equal sums without its surface particles.
 #[test]
 fn a_cloud_has_its_inner_particles() {
     let own = sheet(3.015, VolumeCorrection::None);
@@ -101,9 +100,9 @@ fn context<'a>(law: &'a dyn BondPotential, bonds: &LatticeBonds<2>, youngs: f64)
     }
 }
 
-/// Critical stretches of a linear law: λ_c − 1 is proportional to √G: by `bonds` it is that of Silling and
-/// Askari (√(4πG/(9Eδ)) in plane stress), by `tearing` √c times smaller; by `softening` the energy is e_f
-/// times that up to the onset.
+/// The critical λ_c − 1 of a linear law is proportional to √G: by `bonds` it is that of Silling and Askari
+/// (√(4πG/(9Eδ)) in plane stress), by `tearing` √c times smaller; by `softening` the energy is e_f times that
+/// up to the onset.
 #[test]
 fn critical_stretches_of_the_conventions() {
     let law = Law::Linear.build(0.0, 0.0, false).unwrap();
@@ -124,8 +123,7 @@ fn critical_stretches_of_the_conventions() {
     near("softening_energy", fracture_energy(&context, Convention::Softening, end) / 80.0, 1.0, 1e-9);
 }
 
-/// Compares the critical stretch by `bonds` with its bits before there were conventions
-/// (pure-shear-bond-law.toml of the inputs, run by that build).
+/// The critical stretch by `bonds` keeps the bits of versions without conventions.
 #[test]
 fn bonds_are_what_they_were() {
     let law = Law::Linear.build(0.0, 0.0, false).unwrap();
@@ -140,7 +138,8 @@ fn bonds_are_what_they_were() {
     assert_eq!(critical.resolve(&context).unwrap().to_bits(), 1.030_433_718_334_635_7_f64.to_bits());
 }
 
-/// t = d φ′ of a softened bond, from its energy by finite differences; 0 at λ_f; whole up to λ₀.
+/// The tension t = d φ′ of a softened bond follows from its energy by finite differences: 0 at λ_f, undamaged
+/// up to λ₀.
 #[test]
 fn softened_bonds() {
     let law = Law::ChainOffset.build(50.0, 1200.0, false).unwrap();
@@ -154,8 +153,8 @@ fn softened_bonds() {
     assert_eq!([integrity(onset(end) - 1e-12, end), integrity(end, end)], [1.0, 0.0]);
 }
 
-/// Forces of a body with soft bonds are slopes of its energy, in the kernels of a lattice and of a cloud, and
-/// sum to zero.
+/// Forces of a body with softening bonds are slopes of its energy, in the kernels of a lattice and of a
+/// cloud, and sum to zero.
 #[test]
 fn forces_of_soft_bonds_are_slopes() {
     let lattice = sheet(3.015, VolumeCorrection::None);
@@ -221,8 +220,8 @@ fn part<const D: usize>(bonds: &mut dyn Bonds<D>, n: [f64; D], at: f64) {
     bonds.break_bonds(&list);
 }
 
-/// The area of a plane crack through a body: along an axis all but the half diagonals that miss at both ends,
-/// at 45° and in space to 3 %; of single bonds that break none.
+/// The area of a plane crack through a body is exact along an axis except for missing half diagonals at both
+/// ends, and to 3 % at 45° and in space; single broken bonds have none.
 #[test]
 fn areas_of_cracks() {
     let columns = 40.0;
@@ -283,8 +282,8 @@ fn areas_of_cracks() {
     near("crack_area_solid", area.area::<3>(&solid), exact, 1e-12);
 }
 
-/// Output of `peri check` for a scene.
-fn told(text: &str, folder: &Path) -> String {
+/// Returns the output of `peri check`.
+fn check_output(text: &str, folder: &Path) -> String {
     let source = Source::new(folder.join("scene.toml"), text);
     let scene = source.parse::<Scene>().unwrap_or_else(|error| panic!("{}", error.render()));
     explanation(&source, &scene, false).unwrap_or_else(|error| panic!("{error}")).join("\n")
@@ -310,11 +309,11 @@ side = "y+"
 displacement = ["0 mm", "0.4 mm"]
 "#;
 
-/// Each warning where its cause is, none in a scene that has no cause, and none by `bonds`.
+/// Each cause gives its warning; a scene without causes, and `bonds`, give none.
 #[test]
 fn causes_of_other_energies_are_named() {
     let directory = tempfile::tempdir().unwrap();
-    let told = |text: &str| told(text, directory.path());
+    let told = |text: &str| check_output(text, directory.path());
     let fine = told(STRIP);
     assert!(!fine.contains("warning"), "{fine}");
     assert!(fine.contains("2 J/m² by `tearing`, 1.37805 J/m² by `bonds`; c = 1.4513"), "{fine}");
@@ -333,13 +332,13 @@ fn causes_of_other_energies_are_named() {
         .replace("thickness = \"1 mm\"\n", "")
         .replace(
             "\"-12 mm\"], max = [\"80 mm\", \"12 mm\"]",
-            "\"-12 mm\", \"0 mm\"], max = [\"80 mm\", \
-        \"12 mm\", \"6 mm\"]",
+            "\"-12 mm\", \"0 mm\"], max = [\"80 mm\", \"12 \
+            mm\", \"6 mm\"]",
         )
         .replace(
             "from = [\"-1 mm\", \"0 mm\"], to = [\"40 mm\", \"0 mm\"]",
             "from = [\"-1 mm\", \"0 mm\", \
-        \"-1 mm\"], to = [\"40 mm\", \"0 mm\", \"-1 mm\"], and = [\"-1 mm\", \"0 mm\", \"7 mm\"]",
+            \"-1 mm\"], to = [\"40 mm\", \"0 mm\", \"-1 mm\"], and = [\"-1 mm\", \"0 mm\", \"7 mm\"]",
         )
         .replace("[\"0 mm\", \"0 mm\"]", "[\"0 mm\", \"0 mm\", \"free\"]")
         .replace("[\"0 mm\", \"0.4 mm\"]", "[\"0 mm\", \"0.4 mm\", \"free\"]");

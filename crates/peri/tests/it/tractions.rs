@@ -10,9 +10,8 @@ use peri::material::{
     BodyTensor, Deformation, NonlocalSolid, PointLaw, Pointwise, SolverMaterial, surface_load,
 };
 
-/// A homogeneous deformation of a body with a hole and cracks, on a lattice and as a cloud: the surface load
-/// of its stress leaves no particle out of balance, the area vectors sum to 0, and Σ h⊗X is the volume
-/// (Gauss).
+/// The surface load of the stress of a homogeneous deformation balances every particle of a body with a hole
+/// and cracks, on a lattice and as a cloud; the area vectors sum to 0, and Σ h⊗X is the volume (Gauss).
 fn judge<L: PointLaw<D>, const D: usize>(name: &str, bonds: &dyn Bonds<D>, solid: NonlocalSolid<L>) {
     let gradient =
         BodyTensor::<D>::from_fn(|a, b| [[0.3, -0.1, 0.05], [0.2, -0.2, 0.1], [0.0, 0.15, 0.1]][a][b]);

@@ -1,4 +1,4 @@
-//! Waves and running cracks: the lattice's dispersion, the bar's speed √(E/ρ), the Rayleigh speed.
+//! Waves and running cracks: dispersion of the lattice, wave speed √(E/ρ) of a bar, Rayleigh speed.
 
 use crate::bodies::{Body, MODULUS, Slit, hold, relax};
 use crate::dynamics::{DENSITY, once, run};
@@ -15,8 +15,8 @@ fn chain_frequency(q: f64, spacing: f64, volume: f64) -> f64 {
     (12.0 * MODULUS * volume / DENSITY * (1..=3).map(each).sum::<f64>()).sqrt()
 }
 
-/// A Gaussian at rest in the middle of a long row splits in two: against the lattice's own dispersion for all
-/// wave numbers at once, and against d'Alembert's solution with the chain's modulus.
+/// A Gaussian at rest in the middle of a long row splits in two: in agreement with the dispersion of the
+/// lattice for all wave numbers, and with d'Alembert's solution with the modulus of the chain.
 #[test]
 fn waves_in_a_chain() {
     let law = Law::Linear.build(1.0, 1.0, false).unwrap();
@@ -83,8 +83,8 @@ fn waves_in_a_chain() {
     assert!(errors.iter().all(|e| (0.994..1.0001).contains(&e.2)), "{errors:?}");
 }
 
-/// A thin bar in plane stress: the wave runs with √(E/ρ), E the static modulus of the same bar, and with the
-/// material's E but for the bonds that its surfaces lack.
+/// The wave in a thin bar in plane stress has the speed √(E/ρ) with the static modulus E of the bar, which is
+/// that of the material except for missing bonds at surfaces.
 #[test]
 fn wave_in_a_thin_bar() {
     let law = Law::Linear.build(1.0, 1.0, false).unwrap();
@@ -165,8 +165,8 @@ fn wave_in_a_thin_bar() {
     assert!((limit / 1.0486_f64.sqrt() - 1.0).abs() < 2e-3, "{limit}");
 }
 
-/// A strip stretched by ε between its long edges, with a notch: the energy ½C₁₁ε²H of a column ahead of the
-/// crack is `drive` times the fracture energy. The speed of the tip over the Rayleigh speed.
+/// Returns the speed of a crack tip over the Rayleigh speed, in a notched strip stretched by ε between its
+/// long edges: the energy ½C₁₁ε²H of a column ahead of the crack is `drive` times the fracture energy.
 fn crack_speed(rows: usize, drive: f64, law: Law) -> f64 {
     let (height, ratio, stretch) = (1.0, 3.015, 0.01);
     let spacing = height / rows as f64;
@@ -228,7 +228,7 @@ fn crack_speed(rows: usize, drive: f64, law: Law) -> f64 {
     let took = last.released / (toughness * (tips.last().map_or(0.0, |t| t[1]) - 1.0));
     eprintln!(
         "{rows} rows: {speed:.3} c_R, in parts {parts:.3?}; {} broken, {} steps, {} forces, strain {:.3} of \
-        critical; \
+         critical; \
          released {took:.2} G a length, energies off by {off:.1e}",
         state.fracture.broken,
         state.counts.total_iterations,
@@ -243,8 +243,7 @@ fn crack_speed(rows: usize, drive: f64, law: Law) -> f64 {
 }
 
 /// A mode-I crack runs steadily, between 0.4 and 1.0 of the Rayleigh speed, and nearly as fast on a finer
-/// lattice. From drives of about 3 on it branches, as peridynamic cracks do, and below 1.5 it runs slower
-/// than 0.4.
+/// lattice. It branches above drives of about 3 and runs slower than 0.4 below 1.5.
 #[test]
 fn crack_speed_below_rayleigh() {
     let speeds = [(40, Law::Linear), (60, Law::ChainOffset)].map(|(rows, law)| crack_speed(rows, 2.5, law));

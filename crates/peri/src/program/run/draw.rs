@@ -1,7 +1,7 @@
-//! Pictures of several variants: profiles, convergence, error against run time.
+//! Draws variants together: profiles, convergence, error against run time.
 
 use super::compare::{plate_width, run_time};
-use super::outcome::Outcome;
+use super::outcome::VariantOutcome;
 use super::outcome::families;
 use crate::exact;
 use crate::program::scene::{ExactSpec, Scene};
@@ -11,13 +11,13 @@ use harness::output::picture::{LegendPlace, LinePlot, Series};
 use polycore::Error;
 use std::path::Path;
 
-/// Profiles (Fig. 2.7), convergence (Fig. 2.8), error against run time.
-pub fn curves(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), Error> {
+/// Draws profiles (Fig. 2.7), convergence (Fig. 2.8) and error against run time.
+pub fn draw_curves(scene: &Scene, outcomes: &[VariantOutcome], output: &Path) -> Result<(), Error> {
     let (Some(exact), Some(stress)) = (&scene.exact, &scene.stress) else { return Ok(()) };
     let (radius, is_plate) = (exact.hole().0, matches!(exact, ExactSpec::PlateWithHole { .. }));
     let kind = if is_plate { "rmse_inner" } else { "rmse" };
     let error_axis = if is_plate {
-        "RMSE of σ₁₁/σ∞, loaded layers left out"
+        "RMSE of σ₁₁/σ∞ without loaded layers"
     } else {
         "RMSE of σ₁₁/σ∞ (2.84)"
     };
@@ -60,7 +60,7 @@ pub fn curves(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), 
 
 fn profiles(
     scene: &Scene,
-    outcomes: &[Outcome],
+    outcomes: &[VariantOutcome],
     measure: &str,
     radius: f64,
     output: &Path,

@@ -1,4 +1,4 @@
-//! `peri` as a program of the harness.
+//! The program `peri` for the harness.
 
 use super::{explanation, run};
 use crate::error::Error;
@@ -6,7 +6,7 @@ use crate::program::scene::{self, Scene};
 use harness::case::{Case, Fault, Finished, Program, Run};
 use harness::scene::{Failure, Source};
 
-/// Bond-based peridynamics of elastomers.
+/// Program that runs scenes of `peri`.
 pub struct Peri;
 
 impl Case for Peri {
