@@ -46,7 +46,7 @@ pub fn loaded<const D: usize>(
 }
 
 /// Response of a material, and its name.
-pub type Named<const D: usize> = (&'static str, Box<dyn Response<D>>);
+pub type Named<const D: usize> = (&'static str, Box<dyn SolverMaterial<D>>);
 
 /// Returns solids with two passes: chains of 25 links, and by correspondence neo-Hookean rubber, K/μ = 100,
 /// and a learnt law, a network of 209 random weights.

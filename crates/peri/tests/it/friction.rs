@@ -8,13 +8,13 @@ use peri::contact::{Contact, RigidPlane, SHORT_RANGE};
 use peri::field::{CHUNK, Field};
 use peri::material::BondMaterial;
 use peri::potential::Law;
-use peri::solver::{Loads, Method, Record, State, Support, System, VelocityVerlet};
-use peri::surface::Surface;
+use peri::solver::{Loads, Method, State, StepRecord, Support, System, VelocityVerlet};
+use peri::surface::BodySurface;
 
 const G: f64 = 9.81;
 
 /// Builds the contact of a body with planes, with M = 1 Pa.
-pub fn beside(bonds: &dyn Bonds<2>, pairs: f64, planes: Vec<Plane<2>>) -> Contact<2> {
+pub fn beside(bonds: &dyn Bonds<2>, pairs: f64, planes: Vec<RigidPlane<2>>) -> Contact<2> {
     let contact = Contact::short_range(bonds, MODULUS, pairs).unwrap();
     contact.with_planes(bonds, &BodySurface::default(), 1.0, planes).unwrap()
 }

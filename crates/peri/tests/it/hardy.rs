@@ -51,7 +51,7 @@ fn strained<const D: usize>(points: &[[f64; D]]) -> Vec<[f64; D]> {
 
 /// Every particle of a body with a hole, also at edges and corners, has the stress of a complete family;
 /// returns the largest error of `hardy`.
-fn patch<const D: usize>(ratio: f64, cells: [usize; D], measures: &[Measure]) -> f64 {
+fn patch<const D: usize>(ratio: f64, cells: [usize; D], measures: &[StressMethod]) -> f64 {
     let mut body = Body::<D>::solid(cells, 1.0, ratio);
     let far = 2.0 * ratio;
     let centre = cells.map(|c| c as f64 - far - 1.5);
@@ -209,7 +209,7 @@ fn clouds_share_bonds_out() {
 }
 
 /// Returns bodies, forces of their bonds, and a smooth displacement that is not uniform.
-fn smooth() -> (Body<2>, Built<2>, Vec<Pair<2>>, Vec<[f64; 2]>) {
+fn smooth() -> (Body<2>, Built<2>, Vec<BondPair<2>>, Vec<[f64; 2]>) {
     let body = Body::<2>::solid([29, 29], 1.0, 3.015);
     let built = body.build();
     let u = built

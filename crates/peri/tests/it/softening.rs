@@ -68,7 +68,7 @@ fn forces<const D: usize>(
 }
 
 /// Way to compute forces: name, bonds, material and displacement.
-type Path<'a, const D: usize> = (&'a str, &'a dyn Bonds<D>, Box<dyn Response<D>>, Field<D>);
+type Path<'a, const D: usize> = (&'a str, &'a dyn Bonds<D>, Box<dyn SolverMaterial<D>>, Field<D>);
 
 /// Forces at constant integrities are slopes of the energy and sum to zero, on lattices by kernels and by
 /// plain loops, and in clouds.

@@ -9,7 +9,7 @@ use crate::stress::StressMethod;
 use harness::observe::{Curve, Observer, Scalars};
 
 /// Values of σ₁₁/σ∞ by each measure.
-type Normals = Vec<(Measure, Vec<f64>)>;
+type Normals = Vec<(StressMethod, Vec<f64>)>;
 
 /// Observer that compares with the closed form of a scene: peak and profile at θ = π/2, errors over regions.
 pub(super) struct HoleErrors<'s> {

@@ -1,7 +1,7 @@
 //! Writes the fields of a run to a file.
 
 use super::moment::{Moment, SceneObservers};
-use crate::bonds::Kind;
+use crate::bonds::BondKind;
 use crate::error::Error;
 use crate::program::scene::Scene;
 use crate::solver::{State, StepRecord};
@@ -52,7 +52,7 @@ pub fn in_space<const D: usize>(v: [f64; D]) -> [f64; 3] {
 }
 
 /// Flattens a tensor, rows first, extended by zeros for a plane body.
-pub(super) fn tensor_in_space<const D: usize>(t: &Tensor<D>) -> [f64; 9] {
+pub(super) fn tensor_in_space<const D: usize>(t: &StressTensor<D>) -> [f64; 9] {
     std::array::from_fn(|k| t.get(k / 3).and_then(|row| row.get(k % 3)).copied().unwrap_or(0.0))
 }
 
@@ -164,7 +164,7 @@ impl FieldFrames {
             fields.map(|field| (&*field.name, field.components, &*field.values)).collect();
         // between two steps the load is unknown
         let record = m.state.history.last().filter(|_| time.fract() == 0.0);
-        let value = |get: fn(&Record) -> f64| record.map_or(f64::NAN, get);
+        let value = |get: fn(&StepRecord) -> f64| record.map_or(f64::NAN, get);
         let moments = [("displacement", value(|r| r.displacement)), ("load", value(|r| r.load))];
         series.moment(time, &points, &data, &moments)?;
         Ok(())

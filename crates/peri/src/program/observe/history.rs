@@ -9,12 +9,12 @@ use harness::observe::Scalars;
 use harness::report::Quantity;
 
 /// Returns true for a history of explicit dynamics.
-pub fn is_dynamic(history: &[Record]) -> bool {
+pub fn is_dynamic(history: &[StepRecord]) -> bool {
     history.iter().any(|row| row.time > 0.0)
 }
 
 /// Returns the damped energy, J; in quasi-static runs work less stored, released and friction energy.
-pub fn damped_energy(row: &Record, dynamic: bool) -> f64 {
+pub fn damped_energy(row: &StepRecord, dynamic: bool) -> f64 {
     if dynamic { row.damped } else { row.work - row.stored - row.released - row.rubbed }
 }
 
@@ -81,7 +81,7 @@ pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>
 
 /// Adds first break, breaking events and the last load.
 fn breaking_scalars<const D: usize>(dynamic: bool, to: &mut Scalars<Moment<D>>) {
-    let first = |history: &[Record]| history.iter().position(|row| row.broken > 0);
+    let first = |history: &[StepRecord]| history.iter().position(|row| row.broken > 0);
     to.add_if(q::FIRST_BREAK, |m| Some(m.state.history[first(&m.state.history)?].displacement));
     // the load at the end of the step may be past the collapse
     to.add_if(q::LOAD_AT_FIRST_BREAK, |m| {
@@ -108,7 +108,7 @@ fn breaking_scalars<const D: usize>(dynamic: bool, to: &mut Scalars<Moment<D>>) 
 pub(super) fn add_last<const D: usize>(
     to: &mut Scalars<Moment<D>>,
     quantity: Quantity,
-    get: fn(&Record) -> f64,
+    get: fn(&StepRecord) -> f64,
 ) {
     to.add_if(quantity, |m| m.state.history.last().map(get));
 }

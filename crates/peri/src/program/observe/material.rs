@@ -9,7 +9,7 @@ use crate::error::Error;
 use crate::exact::Plate;
 use crate::material::{BondMaterial, Material, NonlocalSolid, Prestrained, SolverMaterial, relief};
 use crate::potential::BondPotential;
-use crate::probe::{LineSampler, Solid, StressEvaluator};
+use crate::probe::{AnySolid, LineSampler, StressEvaluator};
 use crate::program::scene::{
     self, DiscreteBody, Inclusions, ParameterField, Scene, SceneVariant, SurfaceCorrection,
 };
@@ -24,12 +24,12 @@ pub enum SceneMaterial<const D: usize> {
     /// Bond law with prestrains.
     Prestrained(Prestrained<D>),
     /// Solid of the mean deformation of a family.
-    Solid(Solid<D>),
+    Solid(AnySolid<D>),
 }
 
 impl<const D: usize> SceneMaterial<D> {
     /// Returns the material as solvers use it.
-    pub fn respond(&self, bonds: &dyn Bonds<D>) -> Box<dyn Response<D>> {
+    pub fn respond(&self, bonds: &dyn Bonds<D>) -> Box<dyn SolverMaterial<D>> {
         match self {
             Self::Bonds(bonded) => bonded.clone().respond(bonds),
             Self::Prestrained(prestrained) => prestrained.clone().respond(bonds),

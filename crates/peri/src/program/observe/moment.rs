@@ -16,7 +16,7 @@ use std::cell::{OnceCell, RefCell};
 use std::time::Instant;
 
 /// Stress fields by measure.
-pub type StressFields<const D: usize> = Vec<(Measure, Vec<Tensor<D>>)>;
+pub type StressFields<const D: usize> = Vec<(StressMethod, Vec<StressTensor<D>>)>;
 
 /// Stresses of a state by every measure of the scene.
 #[derive(Default)]
@@ -55,7 +55,7 @@ impl<'a, const D: usize> Moment<'a, D> {
     }
 
     /// Iterates over a number of every row of the history.
-    pub fn each(&self, get: fn(&Record) -> f64) -> impl Iterator<Item = f64> {
+    pub fn each(&self, get: fn(&StepRecord) -> f64) -> impl Iterator<Item = f64> {
         self.state.history.iter().map(get)
     }
 
@@ -90,7 +90,7 @@ impl<'a, const D: usize> Moment<'a, D> {
         self.physics.whole.as_ref().map_or(0.0, |[whole, cracked]| whole.iter().zip(cracked).map(part).sum())
     }
 
-    /// Returns the stresses; the recorded time of a measure is its time alone ([`Measured::seconds`]).
+    /// Returns the stresses; the recorded time of a measure is its time alone ([`MeasuredStress::seconds`]).
     ///
     /// # Errors
     /// As [`KernelFit::new`].

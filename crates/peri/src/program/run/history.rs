@@ -23,7 +23,7 @@ impl VariantOutcome {
 
     /// Returns the steps as columns.
     pub fn columns(&self) -> Vec<HistoryColumn> {
-        let each = |get: &dyn Fn(&Record) -> f64| self.history.iter().map(get).collect();
+        let each = |get: &dyn Fn(&StepRecord) -> f64| self.history.iter().map(get).collect();
         let mut columns: Vec<HistoryColumn> = Vec::new();
         columns.extend([
             ("displacement".to_owned(), "m".to_owned(), each(&|r| r.displacement)),

@@ -18,7 +18,7 @@ use crate::error::Error;
 use crate::program::observe::{self, FieldFrames, Moment, Physics, SceneObservers, in_space};
 use crate::program::quantities as q;
 use crate::program::scene::{self, NAMING, Scene, SceneVariant};
-use crate::solver::{Breaking, Method, Record, State, Status, System, load_stepping};
+use crate::solver::{Breaking, Method, State, Status, StepRecord, System, load_stepping};
 use harness::case::{Fault, Run, Step, StepField};
 use harness::observe::{Outputs, Scalars};
 use harness::report::{Phases, Report};

@@ -268,7 +268,7 @@ fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             let why = "bond laws have no strength; [material.solid] has";
             return Err(source.unexpected("material.critical.strength", why));
         }
-        let given = critical.given();
+        let given = critical.alternatives();
         if given.len() != 1 {
             let found = given.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(" and ");
             let found = if found.is_empty() { "none of them".to_owned() } else { found };

@@ -171,7 +171,7 @@ impl ContactSpec {
     /// As [`Contact::with_planes`]; none after [`super::check`].
     pub fn contact<const D: usize>(
         &self,
-        planes: Vec<Plane<D>>,
+        planes: Vec<RigidPlane<D>>,
         body: &DiscreteBody<D>,
         micromodulus: f64,
         modulus: &Property,

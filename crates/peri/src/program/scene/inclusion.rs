@@ -87,7 +87,10 @@ impl<'a, const D: usize> Inclusions<'a, D> {
         let shrinks = scene.material.is_prestrained();
         let mut prestrain = vec![0.0; if shrinks { bonds.sites() } else { 0 }];
         if let Some(values) = following(VaryingParameter::Prestrain).filter(|_| stressed.is_none()) {
-            bonds.particles().iter().for_each(|&site| prestrain[site as usize] = values.at(site as usize));
+            bonds
+                .particles()
+                .iter()
+                .for_each(|&site| prestrain[site as usize] = values.value_at(site as usize));
         }
         for (index, inclusion) in scene.material.inclusions.iter().enumerate() {
             let key = format!("material.inclusions[{index}].shape");

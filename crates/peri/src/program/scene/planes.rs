@@ -2,7 +2,7 @@
 
 use super::values::DiscreteBody;
 use super::{Scene, SolverMethod};
-use crate::contact::Plane;
+use crate::contact::RigidPlane;
 use harness::scene::{SceneError, Source};
 use polycore::numerics::range;
 
@@ -30,7 +30,7 @@ struct PlanePosition<const D: usize> {
 impl<const D: usize> PlanePosition<D> {
     /// Returns the displacement of the plane along its normal, m, at a load factor and a time, s.
     fn displacement(&self, factor: f64, time: f64) -> f64 {
-        let Plane { normal, displacement, velocity, .. } = self.plane;
+        let RigidPlane { normal, displacement, velocity, .. } = self.plane;
         (0..D).map(|d| normal[d] * (factor * displacement[d] + time * velocity[d])).sum()
     }
 }

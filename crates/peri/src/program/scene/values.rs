@@ -32,7 +32,7 @@ pub struct DiscreteBody<const D: usize> {
 
 impl<const D: usize> DiscreteBody<D> {
     /// Returns the face points of its surface: of its shapes, else of its lattice; none of a cloud.
-    pub fn surface(&self) -> Surface<D> {
+    pub fn surface(&self) -> BodySurface<D> {
         match self.bonds.as_lattice() {
             _ if !self.operations.is_empty() => {
                 BodySurface::of_shapes(&self.operations, self.bonds.spacing())
