@@ -14,8 +14,8 @@ use peri::geometry::{Cut, Shape};
 use peri::material::BondMaterial;
 use peri::model::{self, Body, Model, Rubber};
 use peri::potential::Law;
-use peri::solver::{DynamicRelaxation, Lbfgs, Record, State, Status, Support, VelocityVerlet};
-use peri::stress::{self, Measure, Tensor};
+use peri::solver::{DynamicRelaxation, Lbfgs, State, Status, StepRecord, Support, VelocityVerlet};
+use peri::stress::{self, StressMethod, StressTensor};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::collections::HashMap;
@@ -67,7 +67,7 @@ trait AnyBody: Send + Sync {
     fn displacements(&self) -> Vec<f64>;
     fn set_velocity(&mut self, velocity: &[f64]);
     fn history(&self) -> Vec<(&'static str, &'static str, Vec<f64>)>;
-    fn stress(&self, which: &str, measure: Measure) -> Result<Vec<f64>, Error>;
+    fn stress(&self, which: &str, measure: StressMethod) -> Result<Vec<f64>, Error>;
     fn intact(&self) -> Vec<u32>;
     fn fragments(&self) -> usize;
     fn extend(&mut self, factors: Vec<f64>);
@@ -96,7 +96,7 @@ impl<const D: usize> AnyBody for Built<D> {
             let field = |name, data| StepField { name, unit: "m", components: D, data };
             let displacement = sites.iter().flat_map(|&site| state.displacement.get(site)).collect();
             let step = Step {
-                values: Record::SCALARS.map(|(name, unit, get)| (name, unit, get(record))).to_vec(),
+                values: StepRecord::SCALARS.map(|(name, unit, get)| (name, unit, get(record))).to_vec(),
                 fields: vec![field("position", positions.clone()), field("displacement", displacement)],
             };
             if line.step(step) { Ok(()) } else { Err(stopped()) }
@@ -125,11 +125,11 @@ impl<const D: usize> AnyBody for Built<D> {
 
     fn history(&self) -> Vec<(&'static str, &'static str, Vec<f64>)> {
         let rows = Built::history(self);
-        Record::SCALARS.map(|(name, unit, get)| (name, unit, rows.iter().map(get).collect())).to_vec()
+        StepRecord::SCALARS.map(|(name, unit, get)| (name, unit, rows.iter().map(get).collect())).to_vec()
     }
 
-    fn stress(&self, which: &str, measure: Measure) -> Result<Vec<f64>, Error> {
-        let flat = |tensors: Vec<Tensor<D>>| tensors.into_iter().flatten().flatten().collect();
+    fn stress(&self, which: &str, measure: StressMethod) -> Result<Vec<f64>, Error> {
+        let flat = |tensors: Vec<StressTensor<D>>| tensors.into_iter().flatten().flatten().collect();
         Ok(match which {
             "piola" => flat(self.piola(measure)?),
             "deformation" => flat(stress::deformation_gradients(&self.bonds, &self.state.displacement)),
@@ -243,8 +243,8 @@ impl Simulation {
         which: &str,
         measure: &str,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let known = Measure::ALL.into_iter().find(|one| one.name() == measure).ok_or_else(|| {
-            let names: Vec<&str> = Measure::ALL.iter().map(|one| one.name()).collect();
+        let known = StressMethod::ALL.into_iter().find(|one| one.name() == measure).ok_or_else(|| {
+            let names: Vec<&str> = StressMethod::ALL.iter().map(|one| one.name()).collect();
             value(format!("measure: found {measure:?}; allowed: {}", names.join(", ")))
         })?;
         let found =
@@ -318,7 +318,7 @@ where
     let body = body.placed(&spec.space, spec.thickness)?;
     let calibration = if spec.lattice_calibration { Calibration::Lattice } else { Calibration::Continuum };
     let rubber = match (sampled, named) {
-        (Some(law), _) => Rubber::of_law(law, spec.youngs_modulus),
+        (Some(law), _) => Rubber::with_law(law, spec.youngs_modulus),
         (None, name) => {
             let name = name.unwrap_or_default();
             let law = Law::ALL.into_iter().find(|law| law.name() == name).ok_or_else(|| {

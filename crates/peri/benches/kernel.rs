@@ -5,7 +5,7 @@ use peri::bonds::{Bonds, Lattice, LatticeBonds, VolumeCorrection};
 use peri::calibrate::{Space, modulus};
 use peri::field::{CHUNK, Field};
 use peri::geometry::{Operation, Shape, lattice};
-use peri::material::{Correspondence, EightChain, Material, NonlocalSolid, Response};
+use peri::material::{Correspondence, EightChainSolid, Material, NonlocalSolid, SolverMaterial};
 use peri::potential::{KernelFit, Law};
 use polycore::constitutive::hyperelastic::{Compressible, NeoHookean, Volumetric};
 use polycore::constitutive::network::Activation::Softplus;
@@ -46,7 +46,7 @@ pub fn loaded<const D: usize>(
 }
 
 /// Response of a material, and its name.
-pub type Named<const D: usize> = (&'static str, Box<dyn Response<D>>);
+pub type Named<const D: usize> = (&'static str, Box<dyn SolverMaterial<D>>);
 
 /// Returns solids with two passes: chains of 25 links, and by correspondence neo-Hookean rubber, K/μ = 100,
 /// and a learnt law, a network of 209 random weights.
@@ -58,7 +58,7 @@ pub fn solids<const D: usize>(bonds: &dyn Bonds<D>) -> Result<[Named<D>; 3], Err
     let kind = Kind::polyconvex_energy(Symmetry::Isotropic);
     let learnt = Surrogate::random(Header::new(kind, &[(16, Softplus), (8, Softplus)], 1), 1);
     let learnt = learnt.map_err(|error| Error::geometry(error.to_string()))?;
-    let chains = NonlocalSolid(EightChain::new(space, 1.0, 25.0, 100.0)?).respond(bonds);
+    let chains = NonlocalSolid(EightChainSolid::new(space, 1.0, 25.0, 100.0)?).respond(bonds);
     let neo_hookean = NonlocalSolid(Correspondence::new(law, space)?).respond(bonds);
     let learnt = NonlocalSolid(Correspondence::new(learnt, space)?).respond(bonds);
     Ok([
@@ -70,7 +70,7 @@ pub fn solids<const D: usize>(bonds: &dyn Bonds<D>) -> Result<[Named<D>; 3], Err
 
 /// Computes the states and forces of all particles.
 pub fn both_passes<const D: usize>(
-    solid: &mut dyn Response<D>,
+    solid: &mut dyn SolverMaterial<D>,
     bonds: &dyn Bonds<D>,
     displacement: &Field<D>,
     out: &mut Field<D>,

@@ -138,7 +138,7 @@ fn measure_dimension<const D: usize>(
         measure_bonds(&mut cloud, "list", Law::ChainOffset, [0.95, 1.05], threads, rows)?;
         let seconds = measure_bonds(&mut cloud, "list", Law::ChainOffset, WIDE, threads, rows)?;
         measure_solids(&mut cloud, "list", seconds, threads, rows)?;
-        // that of scenes, which takes as long where it is zero
+        // stretches of scenes; softening takes as long if it is zero
         let start = Instant::now();
         let theta = relief(&cloud).unwrap_or_else(|| Field::zeros(cloud.sites()));
         cloud.set_relief(theta);

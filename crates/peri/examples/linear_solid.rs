@@ -42,7 +42,7 @@ impl<const D: usize> Material<D> for LinearSolid {
     fn begin(&self, family: &Family<D>) -> Point {
         let dimension = D as f64;
         let weighted = family.sum(|bond| bond.length * bond.length * bond.volume).max(f64::MIN_POSITIVE);
-        let alpha = dimension * (dimension + 2.0) * self.shear.at(family.site()) / weighted;
+        let alpha = dimension * (dimension + 2.0) * self.shear.value_at(family.site()) / weighted;
         Point { alpha, share: dimension / weighted, ..Point::default() }
     }
 
@@ -56,7 +56,7 @@ impl<const D: usize> Material<D> for LinearSolid {
         });
         let dimension = D as f64;
         let both = 2.0 * dimension / point.share - weighted;
-        point.balance = self.bulk.at(family.site()) - point.alpha * both / (dimension * dimension);
+        point.balance = self.bulk.value_at(family.site()) - point.alpha * both / (dimension * dimension);
         point.dilatation = point.share * extension;
         point.spread = point.share * spread;
     }

@@ -1,7 +1,7 @@
 //! Lattices on a device, compared with the kernel of the host.
 
 #[path = "it/bodies.rs"]
-#[allow(dead_code)] // of what all tests share
+#[allow(dead_code)] // shared by all tests
 mod bodies;
 
 use bodies::{Body, MODULUS, Random, fit, hold, laws, norm};
@@ -70,7 +70,7 @@ fn compare_forces<const D: usize>(device: &Device, cells: [usize; D]) {
     let mut bonds = damaged(cells);
     let u = random(&bonds, 0.05);
     let all = bonds.directed_bonds();
-    bonds.sever(&overstretched(&bonds, &u, &1.05.into(), &peri::bonds::StretchScan::default()));
+    bonds.break_bonds(&overstretched(&bonds, &u, &1.05.into(), &peri::bonds::StretchScan::default()));
     assert!(bonds.directed_bonds() < all);
     let range = stretch_range(&bonds, &u);
     let range = [range.low, range.high].map(|e| (1.0 + e).sqrt()).map(|l| l + 1e-3 * (l - 1.0).signum());
@@ -136,7 +136,7 @@ fn compare_motion<const D: usize>(device: &Device, cells: [usize; D], critical: 
 
     let mut state = State::new(bonds.sites());
     state.velocity = velocity.clone();
-    // how near any bond came to the critical stretch, whichever side it was on
+    // distance of any bond from the critical stretch, on either side of it
     let (mut margin, mut alive) = (f64::INFINITY, whole.intact());
     let mut system = System::new(&mut bonds, BondMaterial::new(&*law, MODULUS), &loads, &[]);
     system.breaking = Some(Breaking { criterion: critical.into(), policy: Policy::default() });

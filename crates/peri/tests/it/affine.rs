@@ -5,7 +5,7 @@ use evidence::near;
 use peri::bonds::{BodyGeometry, LatticeBonds, VolumeCorrection};
 use peri::field::Field;
 use peri::geometry::{Operation, Shape, lattice};
-use peri::material::{Affine, Family, Material, Pointwise, Response};
+use peri::material::{Affine, Family, Material, Pointwise, SolverMaterial};
 use polycore::langevin;
 
 #[test]

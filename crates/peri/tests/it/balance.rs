@@ -216,7 +216,7 @@ fn check_gradient<const D: usize>(cells: [usize; D]) {
             let energy = |d: usize, step: f64| -> f64 {
                 let mut moved = u.clone();
                 moved[particle][d] += step;
-                let of = |p: &&crate::bodies::Pair<D>| {
+                let of = |p: &&crate::bodies::BondPair<D>| {
                     p.weight * p.length * potential.energy(p.deformed(&moved).1)
                 };
                 2.0 * MODULUS * volume * own.iter().map(of).sum::<f64>()

@@ -112,7 +112,7 @@ impl<const D: usize> Body<D> {
 
     /// Returns pairs (I, J), I < J, with reference bond and weight (volume × surface correction), by
     /// comparing all particles.
-    pub fn pairs(&self, points: &[[f64; D]]) -> Vec<Pair<D>> {
+    pub fn pairs(&self, points: &[[f64; D]]) -> Vec<BondPair<D>> {
         // the smallest gap between lattice distances near the horizons used here is far above this rounding
         // margin
         let square = self.horizon().powi(2) * (1.0 + 1e-12);
@@ -125,7 +125,7 @@ impl<const D: usize> Body<D> {
                     let part = (self.horizon() + 0.5 * self.spacing - length) / self.spacing;
                     let linear = self.volume_correction == VolumeCorrection::Linear;
                     let weight = if linear { part.clamp(0.0, 1.0) } else { 1.0 };
-                    pairs.push(Pair { i, j, bond, length, weight });
+                    pairs.push(BondPair { i, j, bond, length, weight });
                 }
             }
         }
@@ -136,7 +136,7 @@ impl<const D: usize> Body<D> {
     }
 
     /// Returns the surface correction of Madenci & Oterkus (2014), §4.2, as in `s12_mosurf.py`.
-    fn correct(&self, pairs: &mut [Pair<D>], count: usize, stiffness: f64) {
+    fn correct(&self, pairs: &mut [BondPair<D>], count: usize, stiffness: f64) {
         let volume = self.spacing.powi(D as i32);
         let mut energy = vec![[0.0; D]; count];
         for pair in pairs.iter() {
@@ -162,7 +162,7 @@ impl<const D: usize> Body<D> {
     /// Returns force densities f_I = Σ_J 2kθ t(λ) w V_J ζ/|ζ|, and the sum of the magnitudes in each.
     pub fn plain_forces(
         &self,
-        pairs: &[Pair<D>],
+        pairs: &[BondPair<D>],
         law: &dyn BondPotential,
         displacement: &[[f64; D]],
     ) -> (Vec<[f64; D]>, Vec<f64>) {
@@ -194,7 +194,7 @@ impl Slit {
 
 /// Bond between two particles.
 #[derive(Clone, Copy)]
-pub struct Pair<const D: usize> {
+pub struct BondPair<const D: usize> {
     pub i: usize,
     pub j: usize,
     pub bond: [f64; D],
@@ -202,7 +202,7 @@ pub struct Pair<const D: usize> {
     pub weight: f64,
 }
 
-impl<const D: usize> Pair<D> {
+impl<const D: usize> BondPair<D> {
     /// Returns ζ and the stretch λ.
     pub fn deformed(&self, displacement: &[[f64; D]]) -> ([f64; D], f64) {
         let zeta = std::array::from_fn(|d| self.bond[d] + displacement[self.j][d] - displacement[self.i][d]);
@@ -211,7 +211,7 @@ impl<const D: usize> Pair<D> {
 }
 
 /// Returns the smallest and largest stretch of all pairs, slightly widened.
-pub fn stretch_range<const D: usize>(pairs: &[Pair<D>], displacement: &[[f64; D]]) -> [f64; 2] {
+pub fn stretch_range<const D: usize>(pairs: &[BondPair<D>], displacement: &[[f64; D]]) -> [f64; 2] {
     let range = pairs
         .iter()
         .map(|pair| pair.deformed(displacement).1)

@@ -13,7 +13,9 @@ use peri::bonds::{
 };
 use peri::calibrate::Space;
 use peri::field::Field;
-use peri::material::{Family, Material, NonlocalSolid, PointLaw, Pointwise, Response, Tensor, relief};
+use peri::material::{
+    BodyTensor, Family, Material, NonlocalSolid, PointLaw, Pointwise, SolverMaterial, relief,
+};
 use peri::solver::{Lbfgs, Method, State, System};
 use std::f64::consts::PI;
 
@@ -34,7 +36,7 @@ impl Scattered {
         Self { side, spacing: 1.0, ratio: 3.015, jitter, uneven: 0.0, correction }
     }
 
-    /// The bonds, with θ where `relieved`.
+    /// Builds the bonds, with θ if `relieved`.
     fn build<const D: usize>(&self, relieved: bool) -> CloudBonds<D> {
         let mut random = Random(5);
         let count = self.side.pow(D as u32);
@@ -89,7 +91,7 @@ fn sever<const D: usize>(bonds: &mut CloudBonds<D>, mut choose: impl FnMut(usize
             }
         });
     }
-    bonds.sever(&list);
+    bonds.break_bonds(&list);
 }
 
 /// Returns the entries of a bond at both ends.
@@ -243,7 +245,7 @@ fn patch<L: PointLaw<D>, const D: usize>(
     let (mut residual, mut off) = (0.0_f64, 0.0_f64);
     for site in sites(bonds) {
         let found = material.points()[site].deformation().unwrap().displacement_gradient;
-        off = off.max((found - Tensor::<D>::from_fn(|a, b| gradient[a][b])).amax());
+        off = off.max((found - BodyTensor::<D>::from_fn(|a, b| gradient[a][b])).amax());
         if bonds.position(site).iter().all(|&x| inside(x)) {
             let force = force.get(site).iter().fold(0.0_f64, |most, f| most.max(f.abs()));
             residual = residual.max(force * bonds.volume(site));

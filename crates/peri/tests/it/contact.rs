@@ -15,7 +15,7 @@ fn contact<const D: usize>(bonds: &dyn Bonds<D>, sites: &[usize], u: &[[f64; D]]
     for (chunk, mut out) in force.chunks_mut().into_iter().enumerate() {
         contact.force(bonds, &field, chunk * CHUNK, &mut out);
     }
-    (sites.iter().map(|&site| force.get(site)).collect(), contact.touching(bonds, &field).energy)
+    (sites.iter().map(|&site| force.get(site)).collect(), contact.summary(bonds, &field).energy)
 }
 
 /// Returns contact forces and energy by comparing all pairs, with given volumes and radii; `bonded` by (I,
@@ -64,7 +64,7 @@ fn two_particles() {
         assert!((force[0][0] + push).abs() <= 1e-14 * stiffness && force[0][1] == 0.0);
         assert!((energy - 0.5 * push * overlap).abs() <= 1e-14 * stiffness, "r = {r}: {energy}");
     }
-    // past each other: pushed on, contact knows distances only
+    // past each other: pushed on, as contact depends on distances only
     let (force, _) = contact(&cloud, &sites, &[[0.0; 2], [-3.0, 0.0]]);
     assert!(force[1][0] < 0.0);
     // bonded: never
@@ -170,8 +170,8 @@ fn check_parted<const D: usize>(cells: [usize; D]) {
         for (bond, pair) in list.iter().zip(&pairs) {
             assert_eq!(bonds.bond(bond.site as usize, bond.index).site, pair[1] as usize);
         }
-        bonds.sever(&list);
-        contact.part(bonds, &pairs);
+        bonds.break_bonds(&list);
+        contact.add_broken_pairs(bonds, &pairs);
         let moved: Vec<[f64; D]> =
             u.iter().zip(&step).map(|(u, s)| std::array::from_fn(|d| u[d] + s[d])).collect();
         let field = scatter(bonds.sites(), sites, &moved);
@@ -187,11 +187,11 @@ fn check_parted<const D: usize>(cells: [usize; D]) {
             force
         };
         assert_eq!(forces(&contact), forces(&fresh));
-        assert_eq!(contact.touching(bonds, &field), fresh.touching(bonds, &field));
-        assert!(contact.touching(bonds, &field).pairs > 50);
+        assert_eq!(contact.summary(bonds, &field), fresh.summary(bonds, &field));
+        assert!(contact.summary(bonds, &field).pairs > 50);
         // what is listed is not listed twice
-        contact.part(bonds, &pairs);
-        assert_eq!(contact.touching(bonds, &field), fresh.touching(bonds, &field));
+        contact.add_broken_pairs(bonds, &pairs);
+        assert_eq!(contact.summary(bonds, &field), fresh.summary(bonds, &field));
     }
     let built = Body::damaged(cells, 0.1, 2.015).build();
     let Built { mut lattice, mut cloud, points, on_lattice, in_cloud } = built;
@@ -238,7 +238,7 @@ fn a_list_holds_while_bodies_fly() {
         let mut fresh = Contact::short_range(&cloud, MODULUS, SHORT_RANGE).unwrap();
         fresh.rebuild(&cloud, &u);
         assert_eq!(forces(&contact, &u), forces(&fresh, &u), "{step}");
-        assert_eq!(contact.touching(&cloud, &u), fresh.touching(&cloud, &u), "{step}");
+        assert_eq!(contact.summary(&cloud, &u), fresh.summary(&cloud, &u), "{step}");
         let gap = 35.0 - 0.2 * f64::from(step);
         if gap > 8.0 {
             far = contact.rebuilds() - first;

@@ -6,8 +6,8 @@ use peri::bonds::{BodyGeometry, BondForces, Bonds, force};
 use peri::field::Field;
 use peri::material::BondMaterial;
 use peri::potential::{BondPotential, Law};
-use peri::solver::{Breaking, Loads, Method, Policy, Record, State, System, VelocityVerlet};
-use peri::stress::{BallVolume, Loaded, Measure, Missing, piola_on_lattice};
+use peri::solver::{Breaking, Loads, Method, Policy, State, StepRecord, System, VelocityVerlet};
+use peri::stress::{BallVolume, StressInput, StressMethod, SurfaceCompensation, piola_on_lattice};
 use std::f64::consts::PI;
 
 pub const DENSITY: f64 = 2.3;
@@ -189,7 +189,7 @@ fn energies_balance() {
         let last = state.history.last().unwrap();
         assert_eq!((last.time, last.factor), (end, 1.0));
         let scale = state.history.iter().map(|r| r.work.abs()).fold(0.0, f64::max);
-        let error = |r: &Record| r.kinetic + r.stored + r.released + r.damped - r.work;
+        let error = |r: &StepRecord| r.kinetic + r.stored + r.released + r.damped - r.work;
         let worst = state.history.iter().map(|r| error(r).abs()).fold(0.0, f64::max) / scale;
         eprintln!(
             "step {part} of critical, damping {damping}, {} broken: work {:.3e}, kinetic {:.3e}, stored \
@@ -338,8 +338,13 @@ fn rigid_rotation() {
         force(bonds, &u, &mut out);
         let each = bonds.particles().iter().map(|&s| norm(out.get(s as usize)));
         largest = largest.max(each.fold(0.0, f64::max) / stiffness);
-        let loaded = Loaded { displacement: &u, fit: &fit, modulus: MODULUS, missing: Missing::Bonds };
-        for measure in [Measure::Hardy, Measure::BallShare, Measure::OnePoint] {
+        let loaded = StressInput {
+            displacement: &u,
+            fit: &fit,
+            modulus: MODULUS,
+            missing: SurfaceCompensation::Bonds,
+        };
+        for measure in [StressMethod::Hardy, StressMethod::BallShare, StressMethod::OnePoint] {
             let piola = piola_on_lattice(bonds, &loaded, measure, BallVolume::Particles);
             let each = piola.iter().flatten().flatten().map(|p| p.abs());
             stress = stress.max(each.fold(0.0, f64::max) / youngs);

@@ -10,8 +10,8 @@ use peri::geometry::{Cut, Operation, Shape, lattice};
 use peri::material::BondMaterial;
 use peri::potential::{BondPotential, Law};
 use peri::solver::{
-    Adrift, Breaking, DynamicRelaxation, Lbfgs, Loads, Method, Policy, State, Stops, System, VelocityVerlet,
-    adrift, inverted,
+    Breaking, ContactStops, DynamicRelaxation, Lbfgs, Loads, Method, Policy, State, System, Unsupported,
+    VelocityVerlet, find_unsupported, inverted,
 };
 
 /// A force on some particles, N, spread evenly.
@@ -181,11 +181,11 @@ fn parts_and_stops() {
     let mut down = up.clone();
     push(&bonds, &mut up, [0.0, 2.0], |x| x[1] > 15.0);
     push(&bonds, &mut down, [0.0, -2.0], |x| x[1] > 15.0);
-    let free = Stops::default();
-    let pairs = Stops { pairs: true, ..Stops::default() };
-    let plane = |normal: f64| Stops { normals: vec![[0.0, normal]], ..Stops::default() };
-    let of = |loads: &Loads<2>, stops: &Stops<2>| adrift(&bonds, loads, None, stops, 1e-3);
-    let Some(Adrift { particles, of: all, middle, axis, force }) = of(&up, &free) else { panic!() };
+    let free = ContactStops::default();
+    let pairs = ContactStops { pairs: true, ..ContactStops::default() };
+    let plane = |normal: f64| ContactStops { normals: vec![[0.0, normal]], ..ContactStops::default() };
+    let of = |loads: &Loads<2>, stops: &ContactStops<2>| find_unsupported(&bonds, loads, None, stops, 1e-3);
+    let Some(Unsupported { particles, total: all, middle, axis, force }) = of(&up, &free) else { panic!() };
     assert_eq!((particles, all, axis), (48, 96, "y"));
     assert!(
         (force - 2.0).abs() < 1e-12 && (middle[1] - 15.0).abs() < 1e-12 && (middle[0] - 4.0).abs() < 1e-12

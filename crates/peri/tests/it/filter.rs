@@ -8,11 +8,11 @@ use peri::bonds::{BodyGeometry, Bonds, LatticeBonds, VolumeCorrection};
 use peri::calibrate::Space;
 use peri::field::Field;
 use peri::geometry::{Operation, Shape, lattice};
-use peri::material::{EightChain, Material, NonlocalSolid, Pointwise, Response};
+use peri::material::{EightChainSolid, Material, NonlocalSolid, Pointwise, SolverMaterial};
 use peri::solver::{Lbfgs, Loads, Method, State, System};
 
-fn rubber<const D: usize>(space: Space, bulk: f64, filter: bool) -> NonlocalSolid<EightChain<D>> {
-    let network = EightChain::new(space, 1.0, 25.0, bulk).unwrap();
+fn rubber<const D: usize>(space: Space, bulk: f64, filter: bool) -> NonlocalSolid<EightChainSolid<D>> {
+    let network = EightChainSolid::new(space, 1.0, 25.0, bulk).unwrap();
     NonlocalSolid(if filter { network.filtered().unwrap() } else { network })
 }
 
@@ -24,7 +24,7 @@ fn filtered_solids_pass_the_battery() {
         let make = |bonds: &dyn Bonds<3>| rubber(Space::Solid, bulk, true).respond(bonds);
         battery::<3>(&format!("filtered, K/μ = {bulk}"), [4, 4, 3], &make);
     }
-    assert!(EightChain::<2>::new(Space::PlaneStress, 1.0, 25.0, 100.0).unwrap().filtered().is_err());
+    assert!(EightChainSolid::<2>::new(Space::PlaneStress, 1.0, 25.0, 100.0).unwrap().filtered().is_err());
 }
 
 fn strip(length: usize, rows: usize) -> LatticeBonds<2> {

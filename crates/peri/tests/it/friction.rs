@@ -4,19 +4,19 @@ use crate::bodies::{Body, MODULUS, Random, Slit, norm};
 use crate::dynamics::DENSITY;
 use peri::Error;
 use peri::bonds::{BodyGeometry, Bonds, CloudBonds, VolumeCorrection};
-use peri::contact::{Contact, Plane, SHORT_RANGE};
+use peri::contact::{Contact, RigidPlane, SHORT_RANGE};
 use peri::field::{CHUNK, Field};
 use peri::material::BondMaterial;
 use peri::potential::Law;
-use peri::solver::{Loads, Method, Record, State, Support, System, VelocityVerlet};
-use peri::surface::Surface;
+use peri::solver::{Loads, Method, State, StepRecord, Support, System, VelocityVerlet};
+use peri::surface::BodySurface;
 
 const G: f64 = 9.81;
 
 /// Builds the contact of a body with planes, with M = 1 Pa.
-pub fn beside(bonds: &dyn Bonds<2>, pairs: f64, planes: Vec<Plane<2>>) -> Contact<2> {
+pub fn beside(bonds: &dyn Bonds<2>, pairs: f64, planes: Vec<RigidPlane<2>>) -> Contact<2> {
     let contact = Contact::short_range(bonds, MODULUS, pairs).unwrap();
-    contact.with_planes(bonds, &Surface::default(), 1.0, planes).unwrap()
+    contact.with_planes(bonds, &BodySurface::default(), 1.0, planes).unwrap()
 }
 
 /// Runs explicit dynamics with linear bonds.
@@ -33,7 +33,7 @@ fn run(
     solver.solve(&mut system, state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))
 }
 
-fn off(row: &Record) -> f64 {
+fn off(row: &StepRecord) -> f64 {
     row.work - row.kinetic - row.stored - row.rubbed - row.released - row.damped
 }
 
@@ -52,18 +52,18 @@ struct Incline {
 const PENALTY: f64 = 1e6;
 
 impl Incline {
-    fn run(&self) -> ([f64; 2], f64, Record) {
+    fn run(&self) -> ([f64; 2], f64, StepRecord) {
         let (sin, cos) = 0.3_f64.sin_cos();
         let (normal, along) = ([-sin, cos], [cos, sin]);
         let mut one = Body::<2>::solid([1, 1], 1.0, 3.015).build().lattice;
         let site = one.particles()[0] as usize;
         let place = one.position(site);
         let point = std::array::from_fn(|d| place[d] - 0.5 * normal[d]);
-        let plane = Plane {
+        let plane = RigidPlane {
             stiffness: PENALTY,
             friction: self.mu,
             velocity: along.map(|x| x * self.belt),
-            ..Plane::new(point, normal.map(|x| 7.0 * x))
+            ..RigidPlane::new(point, normal.map(|x| 7.0 * x))
         };
         let contact = beside(&one, 0.0, vec![plane]);
         let (pull, push) = (G * self.theta.sin(), G * self.theta.cos());
@@ -110,7 +110,7 @@ fn sticks_without_creep() {
             let ([x, _], error, row) = incline.run();
             let slip = G * theta.sin() / PENALTY;
             eprintln!("sticks at {degrees}°, μ = {mu}: {x:e} m, slip {slip:e}, off by {error:.1e} J");
-            // at 10° the swing passes μN: 2 sin θ > μ cos θ, and what slides does so once
+            // at 10° the oscillation exceeds μN: 2 sin θ > μ cos θ, and the particle slides once
             let slides = (2.0 * theta.sin() - mu * theta.cos()).max(0.0) * G / PENALTY;
             assert!(x > -1e-9 && x < 2.0 * slip + slides && error.abs() < 1e-9, "{x:e}");
             assert!(row.rubbed < mu * G * 2.0 * slip);
@@ -139,7 +139,7 @@ fn belt_drags() {
     let reached = 1.5 / (0.4 * G);
     let exact = 1.5 * (1.0 - reached) + 0.5 * 1.5 * reached;
     eprintln!("belt: {v:.6} m/s, {x:.6} m of {exact:.6}, heat {:.6} of 1.125 J, off {error:.1e}", row.rubbed);
-    // what sticks swings by its elastic slip at the frequency √(k/m) = 1e3/s
+    // a sticking particle oscillates by its elastic slip at the frequency √(k/m) = 1e3/s
     assert!((v - 1.5).abs() < 4e-3 && (x - exact).abs() < 1e-4 && error.abs() < 5e-6);
     assert!((row.rubbed - 1.125).abs() < 1e-4);
     let push = [-0.3_f64.sin(), 0.3_f64.cos()].map(|n| n * G);
@@ -157,8 +157,8 @@ fn plane_hits_a_particle() {
     for moves in [false, true] {
         // by its own velocity, or with the load factor, over 1 s
         let (velocity, displacement) = if moves { ([0.5, 0.0], [0.0; 2]) } else { ([0.0; 2], [0.5, 0.0]) };
-        let plane = Plane { velocity, displacement, ..Plane::new([-0.1, 0.0], [1.0, 0.0]) };
-        let contact = beside(&one, 0.0, vec![Plane { stiffness: 2e3, ..plane }]);
+        let plane = RigidPlane { velocity, displacement, ..RigidPlane::new([-0.1, 0.0], [1.0, 0.0]) };
+        let contact = beside(&one, 0.0, vec![RigidPlane { stiffness: 2e3, ..plane }]);
         let mut state = State::new(one.sites());
         let solver = VelocityVerlet {
             time_step: Some(1e-4),
@@ -279,11 +279,11 @@ fn neither_threads_nor_restarts_change_a_bit() {
             let mut built = body.build();
             let bonds = &mut built.lattice;
             let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
-            let plane = Plane {
+            let plane = RigidPlane {
                 friction: friction.unwrap_or(0.0),
                 velocity: [0.5, 0.1],
                 stiffness: 30.0,
-                ..Plane::new([0.0; 2], [0.0, 1.0])
+                ..RigidPlane::new([0.0; 2], [0.0, 1.0])
             };
             let mut contact = beside(bonds, SHORT_RANGE, vec![plane]);
             if let Some(friction) = friction {
@@ -335,26 +335,26 @@ fn neither_threads_nor_restarts_change_a_bit() {
 fn refuses() {
     let one = Body::<2>::solid([1, 1], 1.0, 3.015).build().lattice;
     let contact = || Contact::short_range(&one, MODULUS, SHORT_RANGE).unwrap();
-    let good = Plane::new([0.0; 2], [0.0, 1.0]);
-    let fault = |plane: Plane<2>| {
-        let planes = contact().with_planes(&one, &Surface::default(), 1.0, vec![plane]);
+    let good = RigidPlane::new([0.0; 2], [0.0, 1.0]);
+    let fault = |plane: RigidPlane<2>| {
+        let planes = contact().with_planes(&one, &BodySurface::default(), 1.0, vec![plane]);
         planes.err().map(|error| error.to_string())
     };
     assert_eq!(fault(good), None);
     for (plane, what) in [
-        (Plane { normal: [0.0; 2], ..good }, "normal of a plane: found 0"),
-        (Plane { normal: [f64::NAN, 1.0], ..good }, "normal of a plane: found NaN"),
-        (Plane { stiffness: -1.0, ..good }, "stiffness of a plane: found -1"),
-        (Plane { friction: f64::INFINITY, ..good }, "friction of a plane: found inf"),
-        (Plane { velocity: [f64::NAN; 2], ..good }, "velocity of a plane: found NaN"),
-        (Plane { elastic_slip: Some(0.0), ..good }, "elastic slip of a plane: found 0"),
+        (RigidPlane { normal: [0.0; 2], ..good }, "normal of a plane: found 0"),
+        (RigidPlane { normal: [f64::NAN, 1.0], ..good }, "normal of a plane: found NaN"),
+        (RigidPlane { stiffness: -1.0, ..good }, "stiffness of a plane: found -1"),
+        (RigidPlane { friction: f64::INFINITY, ..good }, "friction of a plane: found inf"),
+        (RigidPlane { velocity: [f64::NAN; 2], ..good }, "velocity of a plane: found NaN"),
+        (RigidPlane { elastic_slip: Some(0.0), ..good }, "elastic slip of a plane: found 0"),
     ] {
         assert!(fault(plane).unwrap().starts_with(what), "{what}");
     }
     assert!(contact().with_friction(-0.1, None).is_err() && contact().with_friction(0.1, Some(0.0)).is_err());
-    let slack = contact().with_planes(&one, &Surface::default(), 0.0, vec![good]).err().unwrap();
+    let slack = contact().with_planes(&one, &BodySurface::default(), 0.0, vec![good]).err().unwrap();
     assert!(slack.to_string().starts_with("modulus of contact: found 0"), "{slack}");
-    let far = Plane { bonded: true, ..Plane::new([0.0, -3.0], [0.0, 1.0]) };
+    let far = RigidPlane { bonded: true, ..RigidPlane::new([0.0, -3.0], [0.0, 1.0]) };
     assert!(fault(far).unwrap().contains("no face of the body within half a spacing"));
 }
 
@@ -363,7 +363,7 @@ fn refuses() {
 fn plane_through_a_body() {
     let mut built = Body::<2>::solid([12, 12], 1.0, 3.015).build();
     let bonds = &mut built.lattice;
-    let plane = Plane { friction: 0.5, stiffness: 5.0, ..Plane::new([0.0, 6.0], [0.0, 1.0]) };
+    let plane = RigidPlane { friction: 0.5, stiffness: 5.0, ..RigidPlane::new([0.0, 6.0], [0.0, 1.0]) };
     let contact = beside(bonds, SHORT_RANGE, vec![plane]).with_friction(0.5, None).unwrap();
     let mut state = State::new(bonds.sites());
     let solver = VelocityVerlet { records: 5, ..VelocityVerlet::new(DENSITY, 20.0) };

@@ -6,7 +6,7 @@ use peri::calibrate::{Space, modulus};
 use peri::exact::lattice_uniaxial;
 use peri::potential::{BondPotential, Law};
 use peri::solver::{DynamicRelaxation, State};
-use peri::stress::{BallVolume, Loaded, Measure, Missing, piola_on_lattice};
+use peri::stress::{BallVolume, StressInput, StressMethod, SurfaceCompensation, piola_on_lattice};
 
 /// Three affinely moved layers around a body make the inside follow exactly, because every inner particle has
 /// a complete family.
@@ -76,9 +76,13 @@ fn a_sheet_between_rollers_is_in_uniaxial_stress() {
         let mut state = State::new(built.lattice.sites());
         relax(&solver, &mut built.lattice, (&*law, modulus), &loads, &[0.3, 0.6, 1.0], &mut state).unwrap();
         let fit = fit(&*law, state.stretches.fitted);
-        let loaded =
-            Loaded { displacement: &state.displacement, fit: &fit, modulus, missing: Missing::Bonds };
-        let stress = piola_on_lattice(&built.lattice, &loaded, Measure::OnePoint, BallVolume::Whole);
+        let loaded = StressInput {
+            displacement: &state.displacement,
+            fit: &fit,
+            modulus,
+            missing: SurfaceCompensation::Bonds,
+        };
+        let stress = piola_on_lattice(&built.lattice, &loaded, StressMethod::OnePoint, BallVolume::Whole);
         for (particle, x) in built.points.iter().enumerate() {
             if (x[1] - 15.5).abs() < 3.0 && (x[0] - 100.5).abs() < 8.0 {
                 // the ends strain a little differently: the response at the stretch found here
@@ -141,8 +145,13 @@ fn a_block_between_rollers_is_in_uniaxial_stress() {
     let mut state = State::new(built.lattice.sites());
     relax(&solver, &mut built.lattice, (&*law, modulus), &loads, &[1.0], &mut state).unwrap();
     let fit = fit(&*law, state.stretches.fitted);
-    let loaded = Loaded { displacement: &state.displacement, fit: &fit, modulus, missing: Missing::Bonds };
-    let stress = piola_on_lattice(&built.lattice, &loaded, Measure::OnePoint, BallVolume::Whole);
+    let loaded = StressInput {
+        displacement: &state.displacement,
+        fit: &fit,
+        modulus,
+        missing: SurfaceCompensation::Bonds,
+    };
+    let stress = piola_on_lattice(&built.lattice, &loaded, StressMethod::OnePoint, BallVolume::Whole);
     let middle = built.points.iter().position(|x| *x == [40.5, 7.5, 7.5]).unwrap();
     let p = stress[middle];
     let [along, across, depth] = local_stretches(&built, &state, middle);

@@ -109,7 +109,7 @@ fn cradle(bars: usize, particles: usize, safety: f64, kappa: f64) -> (Vec<f64>, 
 }
 
 fn energy_error(state: &State<2>) -> f64 {
-    let off = |row: &peri::solver::Record| ((row.kinetic + row.stored) / row.work - 1.0).abs();
+    let off = |row: &peri::solver::StepRecord| ((row.kinetic + row.stored) / row.work - 1.0).abs();
     state.history.iter().map(off).fold(0.0, f64::max)
 }
 

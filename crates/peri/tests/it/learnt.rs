@@ -10,7 +10,7 @@ use peri::bonds::Bonds;
 use peri::calibrate::Space;
 use peri::field::Field;
 use peri::material::{
-    Correspondence, Deformation, Material, NonlocalSolid, PointLaw, Pointwise, Response, Tensor,
+    BodyTensor, Correspondence, Deformation, Material, NonlocalSolid, PointLaw, Pointwise, SolverMaterial,
 };
 use peri::program::run::{FinishedScene, Peri, run};
 use peri::program::scene::{self, Scene};
@@ -73,7 +73,7 @@ fn distance<const D: usize>(
     law: &Surrogate,
     space: Space,
     cells: [usize; D],
-    gradient: Tensor<D>,
+    gradient: BodyTensor<D>,
 ) -> [f64; 2] {
     let built = Body::<D>::damaged(cells, 0.1, 3.015).build();
     let whole = nalgebra::Matrix3::from_fn(|a, b| match a < D && b < D {
@@ -85,7 +85,7 @@ fn distance<const D: usize>(
         c[2] = thickness(law, c);
     }
     let stress = voigt::to_stress(&law.stress(&c, &mut Workspace::default()).unwrap().stress);
-    let expected = gradient * Tensor::<D>::from_fn(|a, b| stress[(a, b)]);
+    let expected = gradient * BodyTensor::<D>::from_fn(|a, b| stress[(a, b)]);
     let mut off = [0.0_f64; 2];
     for (bonds, sites) in [
         (&built.lattice as &dyn Bonds<D>, &built.on_lattice),
@@ -116,8 +116,8 @@ fn distance<const D: usize>(
 #[test]
 fn a_homogeneous_deformation_has_the_stress_of_the_law() {
     let mut off = [0.0_f64; 2];
-    let plane = Tensor::<2>::new(1.21, 0.12, -0.07, 0.94);
-    let space = Tensor::<3>::new(1.2, 0.1, 0.05, -0.06, 0.95, 0.03, 0.02, -0.04, 1.1);
+    let plane = BodyTensor::<2>::new(1.21, 0.12, -0.07, 0.94);
+    let space = BodyTensor::<3>::new(1.2, 0.1, 0.05, -0.06, 0.95, 0.03, 0.02, -0.04, 1.1);
     let mut note = |[stress, force]: [f64; 2]| off = [off[0].max(stress), off[1].max(force)];
     for law in [trained(), orthotropic(0.0)] {
         for kind in [Space::PlaneStrain, Space::PlaneStress] {
@@ -134,7 +134,7 @@ fn a_homogeneous_deformation_has_the_stress_of_the_law() {
 #[test]
 fn what_leaves_the_box_is_flagged() {
     fn outside<const D: usize>(space: Space, stretches: [f64; D]) -> [bool; 3] {
-        let mut displacement_gradient = Tensor::<D>::zeros();
+        let mut displacement_gradient = BodyTensor::<D>::zeros();
         (0..D).for_each(|d| displacement_gradient[(d, d)] = stretches[d] - 1.0);
         let flags = solid(&trained(), space).0.flags(&Deformation { displacement_gradient, residual: 0.0 });
         std::array::from_fn(|d| flags.outside[d])
@@ -154,7 +154,7 @@ fn what_leaves_the_box_is_flagged() {
         .unwrap(),
         Space::PlaneStrain,
     );
-    let displacement_gradient = Tensor::<2>::identity();
+    let displacement_gradient = BodyTensor::<2>::identity();
     assert!(!closed.unwrap().flags(&Deformation { displacement_gradient, residual: 0.0 }).any());
 }
 

@@ -6,19 +6,19 @@ use crate::linear_solid::{LinearSolid, poisson_ratio};
 use evidence::near;
 use peri::bonds::{BodyGeometry, Bonds, Overstretched};
 use peri::field::Field;
-use peri::material::{BondMaterial, LawCover, Material, Pointwise, Response};
+use peri::material::{BondMaterial, LawCover, Material, Pointwise, SolverMaterial};
 use peri::solver::{
     Breaking, DynamicRelaxation, Lbfgs, Method, Policy, State, Status, System, VelocityVerlet,
 };
 
 /// Builds the response of a material in a body.
-pub type Make<'m, const D: usize> = &'m dyn Fn(&dyn Bonds<D>) -> Box<dyn Response<D> + 'm>;
+pub type Make<'m, const D: usize> = &'m dyn Fn(&dyn Bonds<D>) -> Box<dyn SolverMaterial<D> + 'm>;
 
 /// Body under test: bonds, the response of a material, and positions.
 struct Case<'a, 'm, const D: usize> {
     name: String,
     bonds: &'a mut dyn Bonds<D>,
-    material: Box<dyn Response<D> + 'm>,
+    material: Box<dyn SolverMaterial<D> + 'm>,
     displacement: Field<D>,
 }
 
@@ -190,7 +190,7 @@ impl<'a, 'm, const D: usize> Case<'a, 'm, D> {
             });
         }
         assert!(!list.is_empty());
-        self.bonds.sever(&list);
+        self.bonds.break_bonds(&list);
         let at = self.displacement.clone();
         let before = self.forces(&at);
         let away = self.moved(lone, 0, 0.3 * self.bonds.spacing());

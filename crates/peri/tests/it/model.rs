@@ -11,7 +11,7 @@ use peri::potential::{BondPotential, Law};
 use peri::solver::{
     Breaking, DynamicRelaxation, Lbfgs, Loads, Method, Policy, State, Support, System, VelocityVerlet,
 };
-use peri::stress::Measure;
+use peri::stress::StressMethod;
 
 const CRACK: [[f64; 2]; 2] = [[0.0, 20e-3], [8e-3, 20e-3]];
 
@@ -64,7 +64,7 @@ fn a_model_is_its_parts() {
     assert!(seen >= 3 && simulation.history().len() == 3);
     let particles = bonds.particles().len();
     assert_eq!(simulation.displacements().count(), particles);
-    let stress = simulation.cauchy(Measure::Hardy).unwrap();
+    let stress = simulation.cauchy(StressMethod::Hardy).unwrap();
     assert!(stress.len() == particles && stress.iter().flatten().flatten().all(|x| x.is_finite()));
 }
 
@@ -124,7 +124,7 @@ fn a_law_of_the_caller() {
         simulation.solve(Lbfgs::default()).unwrap();
         simulation
     };
-    let (ours, theirs) = (torn(Rubber::of_law(Springs(0.7), 1e6)), torn(Rubber::new(Law::Linear, 1e6)));
+    let (ours, theirs) = (torn(Rubber::with_law(Springs(0.7), 1e6)), torn(Rubber::new(Law::Linear, 1e6)));
     assert!(theirs.state.fracture.broken > 0);
     assert_eq!(ours.bonds.intact(), theirs.bonds.intact());
     let peak = theirs.history().iter().map(|record| record.load.abs()).fold(0.0, f64::max);
@@ -133,7 +133,7 @@ fn a_law_of_the_caller() {
         let allowed = 1e-8 * b.load.abs() + 1e-8 * peak;
         assert!((a.load - b.load).abs() <= allowed, "{} {}", a.load, b.load);
     }
-    let slack = Model::new(sheet(), Rubber::of_law(Springs(0.0), 1e6)).build();
+    let slack = Model::new(sheet(), Rubber::with_law(Springs(0.0), 1e6)).build();
     let message = slack.err().map(|error| error.to_string()).unwrap_or_default();
     assert!(message.starts_with("t′(1) of the bond law: found 0"), "{message}");
 }

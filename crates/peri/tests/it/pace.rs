@@ -6,7 +6,7 @@ use evidence::{at_most, within};
 use peri::bonds::{BodyGeometry, BondDamage, Bonds, LatticeBonds, Overstretched, VolumeCorrection};
 use peri::calibrate::Space;
 use peri::geometry::{Cut, Operation, Shape, lattice};
-use peri::material::{Affine, Correspondence, EightChain, Material, NonlocalSolid};
+use peri::material::{Affine, Correspondence, EightChainSolid, Material, NonlocalSolid};
 use peri::solver::{Breaking, Criterion, Loads, Method, Policy, State, Status, System, VelocityVerlet};
 use polycore::constitutive::hyperelastic::{Compressible, NeoHookean, Volumetric};
 
@@ -19,8 +19,8 @@ fn neo_hooke<const D: usize>(
     NonlocalSolid(Correspondence::new(law, space).unwrap())
 }
 
-fn rubber<const D: usize>(space: Space, bulk: f64) -> NonlocalSolid<EightChain<D>> {
-    NonlocalSolid(EightChain::new(space, 1.0, 25.0, bulk).unwrap())
+fn rubber<const D: usize>(space: Space, bulk: f64) -> NonlocalSolid<EightChainSolid<D>> {
+    NonlocalSolid(EightChainSolid::new(space, 1.0, 25.0, bulk).unwrap())
 }
 
 fn block<const D: usize>(cells: [usize; D]) -> LatticeBonds<D> {
@@ -68,7 +68,7 @@ fn tightness<const D: usize, M: Material<D> + 'static>(
                 let mut random = Random(5);
                 let list = some(&bonds, broken, &mut random);
                 let response = material().respond(&bonds);
-                bonds.sever(&list);
+                bonds.break_bonds(&list);
                 let mut state = State::new(bonds.sites());
                 let lateral = stretch.powf(-across);
                 for &site in bonds.particles() {
@@ -144,7 +144,8 @@ fn pulled<const D: usize, M: Material<D> + 'static>(name: &str, cells: [usize; D
     let mut state = State::new(system.bonds.sites());
     solver.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(())).unwrap();
     let turned = state.history.iter().map(|row| row.work.abs()).fold(0.0, f64::max);
-    let off = |row: &peri::solver::Record| (row.work - row.stored - row.kinetic - row.damped).abs() / turned;
+    let off =
+        |row: &peri::solver::StepRecord| (row.work - row.stored - row.kinetic - row.damped).abs() / turned;
     let worst = state.history.iter().map(off).fold(0.0, f64::max);
     let most = state.history.iter().map(|row| row.largest_stretch).fold(0.0, f64::max);
     println!(

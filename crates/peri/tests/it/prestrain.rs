@@ -6,7 +6,7 @@ use evidence::near;
 use peri::bonds::{BodyGeometry, Bonds, StretchScan};
 use peri::calibrate::modulus_in;
 use peri::field::Field;
-use peri::material::{BondMaterial, Material, Pointwise, Prestrained, Response};
+use peri::material::{BondMaterial, Material, Pointwise, Prestrained, SolverMaterial};
 use peri::potential::LinearBond;
 use peri::solver::{Lbfgs, Loads, Method, State, System};
 

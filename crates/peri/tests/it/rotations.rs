@@ -195,7 +195,7 @@ fn a_strip_swung_by_its_grip() {
         // it bends a little while it swings
         let range = stretch_range(&simulation.bonds, &simulation.state.displacement);
         assert!(range.low > -0.2 && range.high < 0.2, "{range:?}");
-        let of = |record: &peri::solver::Record| {
+        let of = |record: &peri::solver::StepRecord| {
             (record.kinetic + record.stored - record.work).abs() / record.work
         };
         simulation.history().iter().map(of).fold(0.0, f64::max)

@@ -9,7 +9,7 @@ use peri::bonds::{BodyGeometry, Bonds, CloudBonds, Softened, StretchRange};
 use peri::calibrate::Space;
 use peri::critical::bilinear;
 use peri::field::Field;
-use peri::material::{EightChain, Material, NonlocalSolid, Response, energy_at_strength};
+use peri::material::{EightChainSolid, Material, NonlocalSolid, SolverMaterial, energy_at_strength};
 use peri::solver::{
     Bilinear, Breaking, Criterion, Lbfgs, Method, Policy, State, Status, System, VelocityVerlet,
 };
@@ -55,7 +55,7 @@ fn soften<const D: usize>(bonds: &mut dyn Bonds<D>) {
 }
 
 fn forces<const D: usize>(
-    material: &mut dyn Response<D>,
+    material: &mut dyn SolverMaterial<D>,
     bonds: &dyn Bonds<D>,
     displacement: &Field<D>,
 ) -> Field<D> {
@@ -68,7 +68,7 @@ fn forces<const D: usize>(
 }
 
 /// Way to compute forces: name, bonds, material and displacement.
-type Path<'a, const D: usize> = (&'a str, &'a dyn Bonds<D>, Box<dyn Response<D>>, Field<D>);
+type Path<'a, const D: usize> = (&'a str, &'a dyn Bonds<D>, Box<dyn SolverMaterial<D>>, Field<D>);
 
 /// Forces at constant integrities are slopes of the energy and sum to zero, on lattices by kernels and by
 /// plain loops, and in clouds.
@@ -136,7 +136,7 @@ fn energies_at_a_strength() {
     let plane = energy_at_strength(&neo_hooke::<2>(Space::PlaneStrain, bulk).0, small).unwrap();
     let exact = 0.5 * (1.0 - poisson * poisson) * small * small / youngs;
     near("energy_at_strength_plane_strain", plane / exact, 1.0, 2e-4);
-    let long = EightChain::<2>::new(Space::PlaneStress, 1.0, 1e9, f64::INFINITY).unwrap();
+    let long = EightChainSolid::<2>::new(Space::PlaneStress, 1.0, 1e9, f64::INFINITY).unwrap();
     let stretch: f64 = 1.8;
     let sheet = energy_at_strength(&long, stretch - stretch.powi(-2)).unwrap();
     near("energy_at_strength_sheet", sheet, 0.5 * (stretch.powi(2) + 2.0 / stretch - 3.0), 1e-6);
@@ -211,7 +211,7 @@ fn tear(moving: bool, start: Option<&State<2>>, saved: &mut Vec<State<2>>) -> St
     body.slits = vec![Slit { at: 1.2, from: -1.0, to: 1.2 }];
     let mut built = body.build();
     let bonds = &mut built.lattice;
-    let solid: NonlocalSolid<EightChain<2>> = rubber(Space::PlaneStrain, 5.0);
+    let solid: NonlocalSolid<EightChainSolid<2>> = rubber(Space::PlaneStrain, 5.0);
     let onset = energy_at_strength(&solid.0, 1.0).unwrap();
     let law = bilinear(bonds, 0.1, onset).unwrap();
     assert!(law.ductility() > 1.5 && law.ductility() < 5.0, "{law:?}");

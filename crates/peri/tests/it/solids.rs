@@ -9,8 +9,8 @@ use peri::calibrate::Space;
 use peri::field::Field;
 use peri::geometry::{Operation, Shape, lattice};
 use peri::material::{
-    Correspondence, Deformation, EightChain, Family, Material, NonlocalSolid, PointLaw, Pointwise, Response,
-    Tensor,
+    BodyTensor, Correspondence, Deformation, EightChainSolid, Family, Material, NonlocalSolid, PointLaw,
+    Pointwise, SolverMaterial,
 };
 use polycore::constitutive::hyperelastic::{Compressible, NeoHookean, Volumetric};
 
@@ -24,8 +24,8 @@ pub fn neo_hooke<const D: usize>(
     NonlocalSolid(Correspondence::new(law, space).unwrap())
 }
 
-pub fn rubber<const D: usize>(space: Space, bulk: f64) -> NonlocalSolid<EightChain<D>> {
-    NonlocalSolid(EightChain::new(space, 1.0, 25.0, bulk).unwrap())
+pub fn rubber<const D: usize>(space: Space, bulk: f64) -> NonlocalSolid<EightChainSolid<D>> {
+    NonlocalSolid(EightChainSolid::new(space, 1.0, 25.0, bulk).unwrap())
 }
 
 #[test]
@@ -100,7 +100,7 @@ impl<const D: usize> Block<D> {
                 }
             });
         }
-        self.bonds.sever(&list);
+        self.bonds.break_bonds(&list);
     }
 
     /// Returns the largest differences of f, F, W and I from the program, over the largest of each, and ΣE
@@ -192,7 +192,7 @@ fn long_chains_are_neo_hookean() {
     let built = body.build();
     let moved = Random(3).vectors(built.points.len(), 0.05);
     let displacement = scatter(built.lattice.sites(), &built.on_lattice, &moved);
-    let forces = |material: &mut dyn Response<2>| {
+    let forces = |material: &mut dyn SolverMaterial<2>| {
         material.prepare(&built.lattice, &displacement);
         let mut force = Field::<2>::zeros(built.lattice.sites());
         for (chunk, mut part) in force.chunks_mut().into_iter().enumerate() {
@@ -200,7 +200,7 @@ fn long_chains_are_neo_hookean() {
         }
         force
     };
-    let chains = NonlocalSolid(EightChain::new(Space::PlaneStrain, 1.0, 1e9, 10.0).unwrap());
+    let chains = NonlocalSolid(EightChainSolid::new(Space::PlaneStrain, 1.0, 1e9, 10.0).unwrap());
     let a = forces(&mut Pointwise::new(chains, &built.lattice));
     let b = forces(&mut Pointwise::new(neo_hooke(Space::PlaneStrain, 10.0), &built.lattice));
     let largest =
@@ -212,7 +212,7 @@ fn long_chains_are_neo_hookean() {
 
 /// Returns F of a homogeneous deformation.
 fn homogeneous<const D: usize>(stretches: [f64; D]) -> Deformation<D> {
-    let gradient = Tensor::<D>::from_fn(|a, b| if a == b { stretches[a] - 1.0 } else { 0.0 });
+    let gradient = BodyTensor::<D>::from_fn(|a, b| if a == b { stretches[a] - 1.0 } else { 0.0 });
     Deformation { displacement_gradient: gradient, residual: 0.0 }
 }
 
@@ -226,7 +226,7 @@ fn nominal_stresses_of_the_network() {
         (100.0, 3.0, [2.9287563, 3.006642, 3.0916001]),
     ];
     for (links, stretch, truth) in table {
-        let law = EightChain::new(Space::PlaneStress, 1.0, links, f64::INFINITY).unwrap();
+        let law = EightChainSolid::new(Space::PlaneStress, 1.0, links, f64::INFINITY).unwrap();
         let states = [[stretch, stretch.powf(-0.5)], [stretch, 1.0], [stretch, stretch]];
         for (state, truth) in states.into_iter().zip(truth) {
             let found = PointLaw::<2>::respond(&law, &homogeneous(state)).piola[(0, 0)];
@@ -234,7 +234,7 @@ fn nominal_stresses_of_the_network() {
         }
     }
     for (links, truth) in [(8.0, 99.2738375096), (25.0, 99.3164676363)] {
-        let law = EightChain::<3>::new(Space::Solid, 1.0, links, 100.0).unwrap();
+        let law = EightChainSolid::<3>::new(Space::Solid, 1.0, links, 100.0).unwrap();
         near(&format!("eight_chain_kappa_{links}"), law.volumetric(), truth, 1e-9);
     }
 }
@@ -242,7 +242,7 @@ fn nominal_stresses_of_the_network() {
 /// P/μ₀ at l = 2 with free sides: 3D, plane strain, plane stress with a finite K.
 #[test]
 fn free_sides_follow_the_bulk_modulus() {
-    fn pulled<const D: usize>(law: &EightChain<D>) -> f64 {
+    fn pulled<const D: usize>(law: &EightChainSolid<D>) -> f64 {
         // P₂₂ = 0 by bisection in the stretch of the sides
         let respond = |side: f64| {
             let mut stretches = [side; D];
@@ -264,17 +264,17 @@ fn free_sides_follow_the_bulk_modulus() {
     for (space, truth) in tables {
         for (bulk, truth) in bulk.into_iter().zip(truth) {
             let found = if space == Space::Solid {
-                pulled::<3>(&EightChain::new(space, 1.0, 25.0, bulk).unwrap())
+                pulled::<3>(&EightChainSolid::new(space, 1.0, 25.0, bulk).unwrap())
             } else {
-                pulled::<2>(&EightChain::new(space, 1.0, 25.0, bulk).unwrap())
+                pulled::<2>(&EightChainSolid::new(space, 1.0, 25.0, bulk).unwrap())
             };
             near(&format!("eight_chain_pulled_{space:?}_{bulk}"), found, truth, 2e-5);
         }
     }
     // a sheet of a finite K is a solid whose two sides are free
     for bulk in bulk {
-        let sheet = pulled::<2>(&EightChain::new(Space::PlaneStress, 1.0, 25.0, bulk).unwrap());
-        let solid = pulled::<3>(&EightChain::new(Space::Solid, 1.0, 25.0, bulk).unwrap());
+        let sheet = pulled::<2>(&EightChainSolid::new(Space::PlaneStress, 1.0, 25.0, bulk).unwrap());
+        let solid = pulled::<3>(&EightChainSolid::new(Space::Solid, 1.0, 25.0, bulk).unwrap());
         near(&format!("eight_chain_sheet_{bulk}"), sheet, solid, 1e-12);
     }
 }
@@ -341,24 +341,24 @@ fn energies_of_small_strains_keep_their_digits() {
     fn worst<const D: usize>(law: &impl PointLaw<D>) -> f64 {
         let mut worst = 0.0_f64;
         for shear in [1e-3, 1e-5, 1e-7] {
-            let mut displacement_gradient = Tensor::<D>::zeros();
+            let mut displacement_gradient = BodyTensor::<D>::zeros();
             displacement_gradient[(0, 1)] = shear;
             let found = law.energy(&Deformation { displacement_gradient, residual: 0.0 });
             worst = worst.max((found / (0.5 * shear * shear) - 1.0).abs());
         }
         worst
     }
-    let chains = |space, bulk| EightChain::<2>::new(space, 1.0, 25.0, bulk).unwrap();
+    let chains = |space, bulk| EightChainSolid::<2>::new(space, 1.0, 25.0, bulk).unwrap();
     let planes = [chains(Space::PlaneStress, f64::INFINITY), chains(Space::PlaneStress, 10.0)];
     let worst_plane = planes.iter().map(worst).fold(worst(&chains(Space::PlaneStrain, 100.0)), f64::max);
-    let solid = worst(&EightChain::<3>::new(Space::Solid, 1.0, 25.0, 100.0).unwrap());
+    let solid = worst(&EightChainSolid::<3>::new(Space::Solid, 1.0, 25.0, 100.0).unwrap());
     at_most("eight_chain_energy_small_strain", worst_plane.max(solid), 2e-6);
 }
 
 /// The force of a crushed sheet is the slope of its energy.
 #[test]
 fn crushed_sheets_have_the_energy_of_their_force() {
-    let law = EightChain::<2>::new(Space::PlaneStress, 1.0, 400.0, 10.0).unwrap();
+    let law = EightChainSolid::<2>::new(Space::PlaneStress, 1.0, 400.0, 10.0).unwrap();
     let at = |x: f64| homogeneous([x, 0.8]);
     for stretch in [0.03, 0.05, 0.075, 0.3] {
         let step = 1e-6;
@@ -370,8 +370,8 @@ fn crushed_sheets_have_the_energy_of_their_force() {
 
 #[test]
 fn laws_of_another_dimension_are_refused() {
-    assert!(EightChain::<2>::new(Space::Solid, 1.0, 25.0, 100.0).is_err());
-    assert!(EightChain::<3>::new(Space::PlaneStress, 1.0, 25.0, 100.0).is_err());
+    assert!(EightChainSolid::<2>::new(Space::Solid, 1.0, 25.0, 100.0).is_err());
+    assert!(EightChainSolid::<3>::new(Space::PlaneStress, 1.0, 25.0, 100.0).is_err());
     let law = Compressible::new(NeoHookean::new(1.0).unwrap(), Volumetric::Ciarlet { lame: 1.0 }).unwrap();
     assert!(Correspondence::<_, 2>::new(law, Space::Solid).is_err());
 }
@@ -382,7 +382,8 @@ fn iterations_at_large_bulk_moduli() {
     let iterations = |bulk: f64| {
         let strip = Shape::rectangle([0.0, -3e-3], [32e-3, 11e-3]);
         let body = peri::model::Body::lattice(strip, 0.5e-3).plane_strain(1e-3);
-        let rubber = NonlocalSolid(EightChain::new(Space::PlaneStrain, 0.4e6, 25.0, bulk * 0.4e6).unwrap());
+        let rubber =
+            NonlocalSolid(EightChainSolid::new(Space::PlaneStrain, 0.4e6, 25.0, bulk * 0.4e6).unwrap());
         let model = peri::model::Model::new(body, rubber)
             .clamp(|[_, y]| y < 0.0)
             .displace(|[_, y]| y > 8e-3, [0.0, -0.08e-3]);

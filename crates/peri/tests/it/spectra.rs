@@ -7,7 +7,9 @@ use peri::bonds::{BodyGeometry, Bonds, LatticeBonds, VolumeCorrection};
 use peri::calibrate::Space;
 use peri::field::Field;
 use peri::geometry::{Operation, Shape, lattice};
-use peri::material::{Correspondence, Deformation, NonlocalSolid, PointLaw, Pointwise, Response, Tensor};
+use peri::material::{
+    BodyTensor, Correspondence, Deformation, NonlocalSolid, PointLaw, Pointwise, SolverMaterial,
+};
 use peri::solver::{Lbfgs, Loads, Method, State, System};
 use polycore::constitutive::hyperelastic::{Compressible, NeoHookean, Volumetric};
 use std::f64::consts::PI;
@@ -29,7 +31,7 @@ fn block<const D: usize>(cells: [usize; D], spacing: f64) -> LatticeBonds<D> {
 }
 
 pub fn forces<const D: usize>(
-    material: &mut dyn Response<D>,
+    material: &mut dyn SolverMaterial<D>,
     bonds: &dyn Bonds<D>,
     displacement: &Field<D>,
 ) -> Field<D> {
@@ -198,8 +200,8 @@ pub fn errors(bonds: &mut dyn Bonds<2>, n: usize, bulk: f64, volume: f64) -> [f6
     let place = |site: usize, bonds: &dyn Bonds<2>| bonds.position(site).map(|x| x - width);
     let piola = |at: [f64; 2]| {
         let columns = [0, 1].map(|k| derivative(|x| manufactured(x, volume), at, k, 1e-3));
-        let gradient = Tensor::<2>::from_fn(|a, b| columns[b][a]);
-        let displacement_gradient = gradient - Tensor::<2>::identity();
+        let gradient = BodyTensor::<2>::from_fn(|a, b| columns[b][a]);
+        let displacement_gradient = gradient - BodyTensor::<2>::identity();
         let stress = law.respond(&Deformation { displacement_gradient, residual: 0.0 }).piola;
         [stress[(0, 0)], stress[(0, 1)], stress[(1, 0)], stress[(1, 1)]]
     };

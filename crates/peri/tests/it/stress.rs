@@ -1,13 +1,15 @@
 //! Stress measures against independent tables (`stress_patch.csv`, `stress_surface.csv`, made by
 //! `s3_stress.py`), against reference sums over all bonds, and against the balance of momentum.
 
-use crate::bodies::{Body, Built, MODULUS, Pair, Random, fit, norm, scatter, stretch_range};
+use crate::bodies::{Body, BondPair, Built, MODULUS, Random, fit, norm, scatter, stretch_range};
 use peri::bonds::{BodyGeometry, BondForces, LatticeBonds};
 use peri::calibrate::{Space, modulus, poisson_ratio};
 use peri::field::Field;
 use peri::geometry::lattice;
 use peri::potential::{BondPotential, Law};
-use peri::stress::{BallVolume, Loaded, Measure, Missing, Tensor, ball_volume, segment_fraction};
+use peri::stress::{
+    BallVolume, StressInput, StressMethod, StressTensor, SurfaceCompensation, ball_volume, segment_fraction,
+};
 use peri::stress::{cauchy, deformation_gradients, piola_in_cloud, piola_on_lattice};
 
 /// Strain for comparison with tables of linear theory: bonds are nonlinear to this order, so the tolerance on
@@ -31,21 +33,22 @@ fn measured<const D: usize>(
     built: &Built<D>,
     ratio: f64,
     particle: usize,
-    measure: Measure,
+    measure: StressMethod,
     ball: BallVolume,
     cloud: bool,
 ) -> Vec<(&'static str, [f64; 2])> {
     let u = uniaxial(&built.points);
     let fit = fit(&*Law::Linear.build(1.0, 1.0, false).unwrap(), [0.9, 1.1]);
     let modulus = modulus(space(D), 1.0, ratio, 1.0);
-    let diagonal = |p: Tensor<D>| [p[0][0] / STRAIN, p[1][1] / STRAIN];
+    let diagonal = |p: StressTensor<D>| [p[0][0] / STRAIN, p[1][1] / STRAIN];
     let field = scatter(built.lattice.sites(), &built.on_lattice, &u);
-    let state = Loaded { displacement: &field, fit: &fit, modulus, missing: Missing::Bonds };
+    let state = StressInput { displacement: &field, fit: &fit, modulus, missing: SurfaceCompensation::Bonds };
     let stress = piola_on_lattice(&built.lattice, &state, measure, ball);
     let mut results = vec![("lattice", diagonal(stress[particle]))];
     if cloud {
         let field = scatter(built.cloud.sites(), &built.in_cloud, &u);
-        let state = Loaded { displacement: &field, fit: &fit, modulus, missing: Missing::Bonds };
+        let state =
+            StressInput { displacement: &field, fit: &fit, modulus, missing: SurfaceCompensation::Bonds };
         let stress = piola_in_cloud(&built.cloud, &state, measure, ball);
         results.push(("cloud", diagonal(stress[built.in_cloud[particle]])));
     }
@@ -78,13 +81,13 @@ fn check_patch<const D: usize>(ratio: f64, cloud: bool) {
     let (built, middle) = patch::<D>(ratio);
     // the whole ball lies in the body: every reading of its volume but the cells' (64 slices in 3D) is exact
     let rows = [
-        (Measure::AsPublished, BallVolume::Whole, [printed, f64::NAN]),
-        (Measure::BallShare, BallVolume::Whole, [hardy, hardy_22]),
-        (Measure::BallShare, BallVolume::Particles, [hardy, hardy_22]),
-        (Measure::OnePoint, BallVolume::Particles, [one_point, one_point_22]),
+        (StressMethod::AsPublished, BallVolume::Whole, [printed, f64::NAN]),
+        (StressMethod::BallShare, BallVolume::Whole, [hardy, hardy_22]),
+        (StressMethod::BallShare, BallVolume::Particles, [hardy, hardy_22]),
+        (StressMethod::OnePoint, BallVolume::Particles, [one_point, one_point_22]),
     ];
     for (measure, ball, expected) in rows {
-        if ball == BallVolume::Particles && measure == Measure::BallShare && !cloud {
+        if ball == BallVolume::Particles && measure == StressMethod::BallShare && !cloud {
             continue; // long, and the same sums as over the whole ball
         }
         for (path, found) in measured(&built, ratio, middle, measure, ball, cloud) {
@@ -97,7 +100,7 @@ fn check_patch<const D: usize>(ratio: f64, cloud: bool) {
             }
             if (D, ratio, ball) == (2, 3.015, BallVolume::Whole) {
                 match measure {
-                    Measure::AsPublished => {
+                    StressMethod::AsPublished => {
                         evidence::near(
                             "patch test, m = 3, share of the stress as printed",
                             found[0],
@@ -139,7 +142,7 @@ fn patch_test_in_space_at_a_large_horizon() {
     let built = Body::<3>::solid([13; 3], 1.0, ratio).build();
     let middle = built.points.len() / 2;
     let expected = PATCH[6].2;
-    for (path, found) in measured(&built, ratio, middle, Measure::OnePoint, BallVolume::Whole, true) {
+    for (path, found) in measured(&built, ratio, middle, StressMethod::OnePoint, BallVolume::Whole, true) {
         assert!((found[0] - expected[2]).abs() < TOLERANCE, "{path}: {found:?}");
         assert!((found[1] - expected[4]).abs() < TOLERANCE, "{path}: {found:?}");
     }
@@ -182,9 +185,9 @@ fn check_surface<const D: usize>(ratio: f64, depth: usize, cells_tolerance: f64,
             std::array::from_fn(|d| if d == 1 { cells[1] as f64 - 0.5 - row as f64 } else { middle });
         let particle = built.points.iter().position(|x| *x == at).unwrap();
         let balls = [
-            (Measure::BallShare, BallVolume::Whole, TOLERANCE),
-            (Measure::BallShare, BallVolume::Cells, TOLERANCE + cells_tolerance),
-            (Measure::OnePoint, BallVolume::Whole, TOLERANCE),
+            (StressMethod::BallShare, BallVolume::Whole, TOLERANCE),
+            (StressMethod::BallShare, BallVolume::Cells, TOLERANCE + cells_tolerance),
+            (StressMethod::OnePoint, BallVolume::Whole, TOLERANCE),
         ];
         for ((measure, ball, tolerance), e) in balls.into_iter().zip(expected) {
             // a cloud has no cells
@@ -240,8 +243,14 @@ fn ball_inside_thin_bodies() {
             // half way along, at the edge and in the middle
             for row in [0, width / 2] {
                 let particle = 15 + 30 * row;
-                let found =
-                    measured(&built, ratio * 0.1, particle, Measure::BallShare, BallVolume::Particles, true);
+                let found = measured(
+                    &built,
+                    ratio * 0.1,
+                    particle,
+                    StressMethod::BallShare,
+                    BallVolume::Particles,
+                    true,
+                );
                 let [(_, lattice), (_, cloud)] = found[..] else { panic!("two paths") };
                 // roundings of the same sums, in units of Eε ≈ 1; at ratio 3 a particle lies on the ball's
                 // surface and bonds touch it, whose fraction is rounded to √ε
@@ -259,11 +268,11 @@ fn ball_inside_thin_bodies() {
 fn hardy_sum<const D: usize>(
     body: &Body<D>,
     points: &[[f64; D]],
-    pairs: &[Pair<D>],
+    pairs: &[BondPair<D>],
     law: &dyn BondPotential,
     u: &[[f64; D]],
     at: [f64; D],
-) -> Tensor<D> {
+) -> StressTensor<D> {
     let volume = body.spacing.powi(D as i32);
     let mut sum = [[0.0; D]; D];
     for pair in pairs {
@@ -294,12 +303,22 @@ fn check_definition<const D: usize>(cells: [usize; D], ratio: f64) {
     let law = Law::ChainOffset.build(720.0, 1200.0, false).unwrap();
     let fit = fit(&*law, stretch_range(&pairs, &u));
     let field = scatter(built.lattice.sites(), &built.on_lattice, &u);
-    let state = Loaded { displacement: &field, fit: &fit, modulus: MODULUS, missing: Missing::Bonds };
-    let on_lattice = piola_on_lattice(&built.lattice, &state, Measure::BallShare, BallVolume::Whole);
+    let state = StressInput {
+        displacement: &field,
+        fit: &fit,
+        modulus: MODULUS,
+        missing: SurfaceCompensation::Bonds,
+    };
+    let on_lattice = piola_on_lattice(&built.lattice, &state, StressMethod::BallShare, BallVolume::Whole);
     let field = scatter(built.cloud.sites(), &built.in_cloud, &u);
-    let state = Loaded { displacement: &field, fit: &fit, modulus: MODULUS, missing: Missing::Bonds };
-    let in_cloud = piola_in_cloud(&built.cloud, &state, Measure::BallShare, BallVolume::Whole);
-    let size = |p: &Tensor<D>| p.iter().flatten().map(|x| x * x).sum::<f64>().sqrt();
+    let state = StressInput {
+        displacement: &field,
+        fit: &fit,
+        modulus: MODULUS,
+        missing: SurfaceCompensation::Bonds,
+    };
+    let in_cloud = piola_in_cloud(&built.cloud, &state, StressMethod::BallShare, BallVolume::Whole);
+    let size = |p: &StressTensor<D>| p.iter().flatten().map(|x| x * x).sum::<f64>().sqrt();
     let scale = on_lattice.iter().map(size).fold(0.0, f64::max);
     let step = if D == 2 { 1 } else { 5 };
     for particle in (0..u.len()).step_by(step) {
@@ -307,7 +326,7 @@ fn check_definition<const D: usize>(cells: [usize; D], ratio: f64) {
         for (path, found) in
             [("lattice", on_lattice[particle]), ("cloud", in_cloud[built.in_cloud[particle]])]
         {
-            let apart: Tensor<D> =
+            let apart: StressTensor<D> =
                 std::array::from_fn(|a| std::array::from_fn(|b| found[a][b] - exact[a][b]));
             // the fit's 1e-9 on some hundred bonds of either sign; a bond that only touches the ball, by √ε
             // in its fraction
@@ -403,7 +422,7 @@ fn deformation_gradients_of_torn_bodies() {
 fn cauchy_stress_of_a_homogeneous_strain() {
     fn check<const D: usize>(cells: [usize; D]) {
         let built = Body::<D>::solid(cells, 0.1, 3.015).build();
-        let h: Tensor<D> =
+        let h: StressTensor<D> =
             std::array::from_fn(|a| std::array::from_fn(|b| 0.2 - 0.13 * a as f64 + 0.07 * b as f64));
         let u: Vec<[f64; D]> = built
             .points
@@ -413,7 +432,12 @@ fn cauchy_stress_of_a_homogeneous_strain() {
         let field: Field<D> = scatter(built.lattice.sites(), &built.on_lattice, &u);
         let law = Law::ChainAffine.build(720.0, 1200.0, true).unwrap();
         let fit = fit(&*law, [0.5, 2.0]);
-        let state = Loaded { displacement: &field, fit: &fit, modulus: MODULUS, missing: Missing::Bonds };
+        let state = StressInput {
+            displacement: &field,
+            fit: &fit,
+            modulus: MODULUS,
+            missing: SurfaceCompensation::Bonds,
+        };
         let gradients = deformation_gradients::<D>(&built.lattice, &field);
         for f in &gradients {
             for a in 0..D {
@@ -423,7 +447,7 @@ fn cauchy_stress_of_a_homogeneous_strain() {
                 }
             }
         }
-        let nominal = piola_on_lattice(&built.lattice, &state, Measure::OnePoint, BallVolume::Whole);
+        let nominal = piola_on_lattice(&built.lattice, &state, StressMethod::OnePoint, BallVolume::Whole);
         let sigma = cauchy(&nominal, &gradients);
         for s in &sigma {
             for a in 0..D {

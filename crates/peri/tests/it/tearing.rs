@@ -217,7 +217,7 @@ fn part<const D: usize>(bonds: &mut dyn Bonds<D>, n: [f64; D], at: f64) {
             }
         });
     }
-    bonds.sever(&list);
+    bonds.break_bonds(&list);
 }
 
 /// The area of a plane crack through a body is exact along an axis except for missing half diagonals at both
@@ -238,11 +238,11 @@ fn areas_of_cracks() {
     let mut bonds = built();
     let crossing = Crossing::new::<2>(&bonds, None);
     let area = CrackArea::new::<2>(&bonds, &crossing);
-    assert_eq!(area.of::<2>(&bonds), 0.0);
+    assert_eq!(area.area::<2>(&bonds), 0.0);
     part(&mut bonds, [0.0, 1.0], 8.0);
     let diagonal = 2.0 / 2f64.sqrt();
     let exact = 0.5 * (columns + (columns - 1.0) * diagonal) / (1.0 + diagonal);
-    near("crack_area_axis", area.of::<2>(&bonds), exact, 1e-12);
+    near("crack_area_axis", area.area::<2>(&bonds), exact, 1e-12);
     // some bonds beside a crack are none
     let mut beside = built();
     let mut list = Vec::new();
@@ -259,8 +259,8 @@ fn areas_of_cracks() {
             }));
         }
     });
-    beside.sever(&list);
-    assert_eq!(area.of::<2>(&beside), 0.0);
+    beside.break_bonds(&list);
+    assert_eq!(area.area::<2>(&beside), 0.0);
     // a lattice turned by 45°, as a cloud
     let turned = 0.5_f64.sqrt();
     let grid = (-40..40).flat_map(|i| (-40..40).map(move |j| [f64::from(i), f64::from(j) + 0.5]));
@@ -272,14 +272,14 @@ fn areas_of_cracks() {
     let mut cloud = CloudBonds::new(&points, &volumes, 0.5, 3.015, VolumeCorrection::None, &[]).unwrap();
     let area = CrackArea::new::<2>(&cloud, &Crossing::new::<2>(&cloud, None));
     part(&mut cloud, [0.0, 1.0], 8.0);
-    near("crack_area_45_degrees", area.of::<2>(&cloud) / 20.0, 1.0, 0.03);
+    near("crack_area_45_degrees", area.area::<2>(&cloud) / 20.0, 1.0, 0.03);
     let mut solid = block(2.015, 7.0);
     let area = CrackArea::new::<3>(&solid, &Crossing::new::<3>(&solid, None));
     part(&mut solid, [0.0, 1.0, 0.0], 3.0);
     // of 7 × 7 cells the diagonals at the rim are missing
     let (d, e) = (4.0 / 2f64.sqrt(), 4.0 / 3f64.sqrt());
     let exact = (49.0 + d * 42.0 + e * 36.0) / (1.0 + d + e);
-    near("crack_area_solid", area.of::<3>(&solid), exact, 1e-12);
+    near("crack_area_solid", area.area::<3>(&solid), exact, 1e-12);
 }
 
 /// Returns the output of `peri check`.

@@ -2,14 +2,14 @@
 
 use super::moment::Moment;
 use crate::error::Error;
-use crate::exact::{HoleComparison, Region};
+use crate::exact::{HoleComparison, HoleRegion};
 use crate::program::quantities as q;
 use crate::program::scene::{ExactSpec, Scene};
-use crate::stress::Measure;
+use crate::stress::StressMethod;
 use harness::observe::{Curve, Observer, Scalars};
 
 /// Values of σ₁₁/σ∞ by each measure.
-type Normals = Vec<(Measure, Vec<f64>)>;
+type Normals = Vec<(StressMethod, Vec<f64>)>;
 
 /// Observer that compares with the closed form of a scene: peak and profile at θ = π/2, errors over regions.
 pub(super) struct HoleErrors<'s> {
@@ -26,7 +26,7 @@ impl<'s> HoleErrors<'s> {
         self.found.as_ref().map(|(hole, _)| hole)
     }
 
-    fn normal(&self, measure: Measure) -> Option<(&HoleComparison, &[f64])> {
+    fn normal(&self, measure: StressMethod) -> Option<(&HoleComparison, &[f64])> {
         let (hole, fields) = self.found.as_ref()?;
         fields.iter().find(|(own, _)| *own == measure).map(|(_, normal)| (hole, &normal[..]))
     }
@@ -61,10 +61,10 @@ impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for HoleErrors<'_> {
             });
             for kind in spec.errors() {
                 let region = match *kind {
-                    "rmse_inner" | "rmse_inner_kirsch" => Region::Inner,
-                    "rmse_bulk" => Region::Bulk,
-                    "rmse_ring" => Region::Ring,
-                    _ => Region::All,
+                    "rmse_inner" | "rmse_inner_kirsch" => HoleRegion::Inner,
+                    "rmse_bulk" => HoleRegion::Bulk,
+                    "rmse_ring" => HoleRegion::Ring,
+                    _ => HoleRegion::All,
                 };
                 to.add_if(q::MEASURE_ERROR.of(&[name, kind]), |_| {
                     let (hole, normal) = normal_stress()?;

@@ -1,11 +1,11 @@
 //! Writes the fields of a run to a file.
 
 use super::moment::{Moment, SceneObservers};
-use crate::bonds::Kind;
+use crate::bonds::BondKind;
 use crate::error::Error;
 use crate::program::scene::Scene;
-use crate::solver::{Record, State};
-use crate::stress::Tensor;
+use crate::solver::{State, StepRecord};
+use crate::stress::StressTensor;
 use harness::observe::{Fields, Place};
 use harness::output::vtkhdf::ParticleSeries;
 use std::path::Path;
@@ -52,7 +52,7 @@ pub fn in_space<const D: usize>(v: [f64; D]) -> [f64; 3] {
 }
 
 /// Flattens a tensor, rows first, extended by zeros for a plane body.
-pub(super) fn tensor_in_space<const D: usize>(t: &Tensor<D>) -> [f64; 9] {
+pub(super) fn tensor_in_space<const D: usize>(t: &StressTensor<D>) -> [f64; 9] {
     std::array::from_fn(|k| t.get(k / 3).and_then(|row| row.get(k % 3)).copied().unwrap_or(0.0))
 }
 
@@ -65,8 +65,8 @@ pub(super) fn displacement_fields<const D: usize>(scene: &Scene, to: &mut Fields
     });
     if scene.body.has_points() {
         to.add("input_index", 1, Place::Points, |m| match m.bonds.kind() {
-            Kind::Cloud(cloud) => cloud.input_order().iter().map(|&line| f64::from(line)).collect(),
-            Kind::Lattice(_) => Vec::new(),
+            BondKind::Cloud(cloud) => cloud.input_order().iter().map(|&line| f64::from(line)).collect(),
+            BondKind::Lattice(_) => Vec::new(),
         });
     }
 }
@@ -164,7 +164,7 @@ impl FieldFrames {
             fields.map(|field| (&*field.name, field.components, &*field.values)).collect();
         // between two steps the load is unknown
         let record = m.state.history.last().filter(|_| time.fract() == 0.0);
-        let value = |get: fn(&Record) -> f64| record.map_or(f64::NAN, get);
+        let value = |get: fn(&StepRecord) -> f64| record.map_or(f64::NAN, get);
         let moments = [("displacement", value(|r| r.displacement)), ("load", value(|r| r.load))];
         series.moment(time, &points, &data, &moments)?;
         Ok(())

@@ -4,17 +4,17 @@ use super::moment::Moment;
 use crate::probe::load_at;
 use crate::program::quantities as q;
 use crate::program::scene::Scene;
-use crate::solver::{Balance, Record};
+use crate::solver::{Balance, StepRecord};
 use harness::observe::Scalars;
 use harness::report::Quantity;
 
 /// Returns true for a history of explicit dynamics.
-pub fn is_dynamic(history: &[Record]) -> bool {
+pub fn is_dynamic(history: &[StepRecord]) -> bool {
     history.iter().any(|row| row.time > 0.0)
 }
 
 /// Returns the damped energy, J; in quasi-static runs work less stored, released and friction energy.
-pub fn damped_energy(row: &Record, dynamic: bool) -> f64 {
+pub fn damped_energy(row: &StepRecord, dynamic: bool) -> f64 {
     if dynamic { row.damped } else { row.work - row.stored - row.released - row.rubbed }
 }
 
@@ -23,7 +23,7 @@ pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>
     let dynamic = scene.dynamics.is_some();
     let breaks = scene.material.critical.is_some();
     let records = scene.dynamics.as_ref().map_or(scene.solver.steps, |dynamics| dynamics.method().records);
-    let peak = |get: fn(&Record) -> f64| {
+    let peak = |get: fn(&StepRecord) -> f64| {
         move |m: &Moment<D>| {
             let peak = m.state.history.iter().max_by(|a, b| a.load.total_cmp(&b.load));
             peak.filter(|_| m.state.history.len() > 1).map(get)
@@ -55,7 +55,8 @@ pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>
         // largest error of the energy balance over the largest work or kinetic energy
         to.add_if(q::ENERGY_ERROR, |m| {
             m.state.history.last()?;
-            let off = |r: &Record| (r.work - r.stored - r.released - r.damped - r.rubbed - r.kinetic).abs();
+            let off =
+                |r: &StepRecord| (r.work - r.stored - r.released - r.damped - r.rubbed - r.kinetic).abs();
             let most = m.each(|r| r.work.abs().max(r.kinetic)).fold(f64::MIN_POSITIVE, f64::max);
             Some(m.state.history.iter().map(off).fold(0.0, f64::max) / most)
         });
@@ -80,7 +81,7 @@ pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>
 
 /// Adds first break, breaking events and the last load.
 fn breaking_scalars<const D: usize>(dynamic: bool, to: &mut Scalars<Moment<D>>) {
-    let first = |history: &[Record]| history.iter().position(|row| row.broken > 0);
+    let first = |history: &[StepRecord]| history.iter().position(|row| row.broken > 0);
     to.add_if(q::FIRST_BREAK, |m| Some(m.state.history[first(&m.state.history)?].displacement));
     // the load at the end of the step may be past the collapse
     to.add_if(q::LOAD_AT_FIRST_BREAK, |m| {
@@ -107,7 +108,7 @@ fn breaking_scalars<const D: usize>(dynamic: bool, to: &mut Scalars<Moment<D>>) 
 pub(super) fn add_last<const D: usize>(
     to: &mut Scalars<Moment<D>>,
     quantity: Quantity,
-    get: fn(&Record) -> f64,
+    get: fn(&StepRecord) -> f64,
 ) {
     to.add_if(quantity, |m| m.state.history.last().map(get));
 }

@@ -7,9 +7,9 @@ use crate::correction::{bond_factors, surface_factors};
 use crate::critical::{Context, CrackArea, Critical, Crossing, Toughness};
 use crate::error::Error;
 use crate::exact::Plate;
-use crate::material::{BondMaterial, Material, NonlocalSolid, Prestrained, Response, relief};
+use crate::material::{BondMaterial, Material, NonlocalSolid, Prestrained, SolverMaterial, relief};
 use crate::potential::BondPotential;
-use crate::probe::{LineSampler, Solid, StressEvaluator};
+use crate::probe::{AnySolid, LineSampler, StressEvaluator};
 use crate::program::scene::{
     self, DiscreteBody, Inclusions, ParameterField, Scene, SceneVariant, SurfaceCorrection,
 };
@@ -24,12 +24,12 @@ pub enum SceneMaterial<const D: usize> {
     /// Bond law with prestrains.
     Prestrained(Prestrained<D>),
     /// Solid of the mean deformation of a family.
-    Solid(Solid<D>),
+    Solid(AnySolid<D>),
 }
 
 impl<const D: usize> SceneMaterial<D> {
     /// Returns the material as solvers use it.
-    pub fn respond(&self, bonds: &dyn Bonds<D>) -> Box<dyn Response<D>> {
+    pub fn respond(&self, bonds: &dyn Bonds<D>) -> Box<dyn SolverMaterial<D>> {
         match self {
             Self::Bonds(bonded) => bonded.clone().respond(bonds),
             Self::Prestrained(prestrained) => prestrained.clone().respond(bonds),
@@ -104,7 +104,7 @@ impl<const D: usize> BodyWithMaterial<D> {
         };
         if let Some(solid) = &spec.solid {
             let law = solid.build::<D>(source, space, scene.is_beside_planes())?;
-            let criterion = spec.critical.map(|critical| critical.of_solid(&*law, &*body.bonds));
+            let criterion = spec.critical.map(|critical| critical.solid_criterion(&*law, &*body.bonds));
             return Ok(Self {
                 criterion: criterion.transpose().map_err(fault)?,
                 material: SceneMaterial::Solid(NonlocalSolid(law)),
@@ -212,7 +212,7 @@ impl<const D: usize> Physics<D> {
         let held = scene::tied_grips(source, scene, &*body.bonds, &loads)?;
         if let Some(held) = &held {
             let list = crate::contact::across(&*body.bonds, held);
-            body.bonds.sever(&list);
+            body.bonds.break_bonds(&list);
         }
         let rows = rows(source, scene, &body)?;
         check_lines(source, scene, &*body.bonds)?;
@@ -250,10 +250,10 @@ impl<const D: usize> Physics<D> {
         self.plate = scene::exact_plate(source, scene, body)?;
         self.evaluator = match &own.material {
             SceneMaterial::Bonds(material) => {
-                StressEvaluator::of_bonds(material.clone(), scene.fit_bound(), breaks)
+                StressEvaluator::for_bonds(material.clone(), scene.fit_bound(), breaks)
             }
             SceneMaterial::Solid(solid) if scene.observes_forces() => {
-                StressEvaluator::of_solid(solid.0.clone(), scene.is_learnt(), bonds)
+                StressEvaluator::for_solid(solid.0.clone(), scene.is_learnt(), bonds)
             }
             _ => StressEvaluator::none(),
         };

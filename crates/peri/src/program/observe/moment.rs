@@ -5,15 +5,18 @@ use crate::bonds::{Bonds, Fragment, covered_stretches, fragments};
 use crate::error::Error;
 use crate::potential::KernelFit;
 use crate::program::scene::Scene;
-use crate::solver::{Record, State};
-use crate::stress::{self, Loaded, Measure, Measured, Missing, Tensor, cauchy, deformation_gradients};
+use crate::solver::{State, StepRecord};
+use crate::stress::{
+    self, MeasuredStress, StressInput, StressMethod, StressTensor, SurfaceCompensation, cauchy,
+    deformation_gradients,
+};
 use harness::observe::{Fields, Observer, Scalars};
 use harness::report::Phases;
 use std::cell::{OnceCell, RefCell};
 use std::time::Instant;
 
 /// Stress fields by measure.
-pub type StressFields<const D: usize> = Vec<(Measure, Vec<Tensor<D>>)>;
+pub type StressFields<const D: usize> = Vec<(StressMethod, Vec<StressTensor<D>>)>;
 
 /// Stresses of a state by every measure of the scene.
 #[derive(Default)]
@@ -52,7 +55,7 @@ impl<'a, const D: usize> Moment<'a, D> {
     }
 
     /// Iterates over a number of every row of the history.
-    pub fn each(&self, get: fn(&Record) -> f64) -> impl Iterator<Item = f64> {
+    pub fn each(&self, get: fn(&StepRecord) -> f64) -> impl Iterator<Item = f64> {
         self.state.history.iter().map(get)
     }
 
@@ -87,7 +90,7 @@ impl<'a, const D: usize> Moment<'a, D> {
         self.physics.whole.as_ref().map_or(0.0, |[whole, cracked]| whole.iter().zip(cracked).map(part).sum())
     }
 
-    /// Returns the stresses; the recorded time of a measure is its time alone ([`Measured::seconds`]).
+    /// Returns the stresses; the recorded time of a measure is its time alone ([`MeasuredStress::seconds`]).
     ///
     /// # Errors
     /// As [`KernelFit::new`].
@@ -110,8 +113,8 @@ impl<'a, const D: usize> Moment<'a, D> {
         let Some(material) = evaluator.bond_material() else {
             let found = phases.time("stress constitutive", || evaluator.stress(bonds, state));
             if let Some([piola, cauchy]) = found {
-                stresses.cauchy.push((Measure::Constitutive, cauchy));
-                stresses.piola.extend(keeps.then_some((Measure::Constitutive, piola)));
+                stresses.cauchy.push((StressMethod::Constitutive, cauchy));
+                stresses.piola.extend(keeps.then_some((StressMethod::Constitutive, piola)));
             }
             return Ok(stresses);
         };
@@ -119,10 +122,10 @@ impl<'a, const D: usize> Moment<'a, D> {
         let fit = KernelFit::new(material.law(), stretches, self.scene.fit_bound())?;
         let gradients =
             phases.time("deformation gradient", || deformation_gradients(bonds, &state.displacement));
-        let (modulus, missing) = (material.modulus(), Missing::WindowAt(&self.physics.by_window));
-        let loaded = Loaded { displacement: &state.displacement, fit: &fit, modulus, missing };
+        let (modulus, missing) = (material.modulus(), SurfaceCompensation::WindowAt(&self.physics.by_window));
+        let loaded = StressInput { displacement: &state.displacement, fit: &fit, modulus, missing };
         let measured = stress::piolas(bonds, &loaded, &spec.measures, spec.ball);
-        for (&measure, Measured { piola, seconds }) in spec.measures.iter().zip(measured) {
+        for (&measure, MeasuredStress { piola, seconds }) in spec.measures.iter().zip(measured) {
             let started = Instant::now();
             stresses.cauchy.push((measure, cauchy(&piola, &gradients)));
             let seconds = seconds + started.elapsed().as_secs_f64();

@@ -1,7 +1,7 @@
 //! Formats, units and distances for pictures.
 
 use super::moment::Moment;
-use crate::solver::{Criterion, Record};
+use crate::solver::{Criterion, StepRecord};
 
 /// Formats with four digits.
 pub fn short(value: f64) -> String {
@@ -27,7 +27,7 @@ pub(super) fn bridge_length<const D: usize>(m: &Moment<D>) -> f64 {
 }
 
 /// Returns the title of a moment: displacement and load of a step, or the equilibrium within a step.
-pub(super) fn moment_title(history: &[Record], time: f64) -> String {
+pub(super) fn moment_title(history: &[StepRecord], time: f64) -> String {
     let step = time.ceil() as usize;
     let Some(record) = step.checked_sub(1).and_then(|k| history.get(k)) else { return String::new() };
     let place = format!("U = {} mm", short(record.displacement * 1e3));

@@ -7,7 +7,7 @@ use crate::calibrate::Space;
 use crate::error::Error;
 use crate::program::quantities as q;
 use crate::program::scene::{Scene, SectionSpec};
-use crate::solver::Record;
+use crate::solver::StepRecord;
 use harness::observe::{Observer, Outputs, Scalars};
 use harness::output::csv;
 use harness::report::Named;
@@ -45,7 +45,7 @@ impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for Sections<'_> {
 
     /// Writes `section_NAME_VARIANT.csv` with the rows of the history.
     fn write(&self, m: &Moment<'m, D>, to: &Outputs) -> Result<(), Error> {
-        let column = |get: &dyn Fn(&Record) -> f64| m.state.history.iter().map(get).collect::<Vec<f64>>();
+        let column = |get: &dyn Fn(&StepRecord) -> f64| m.state.history.iter().map(get).collect::<Vec<f64>>();
         for (section, first, names) in self.each() {
             let mut table = vec![
                 ("displacement", "m", column(&|row| row.displacement)),

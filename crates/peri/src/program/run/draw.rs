@@ -5,7 +5,7 @@ use super::outcome::VariantOutcome;
 use super::outcome::families;
 use crate::exact;
 use crate::program::scene::{ExactSpec, Scene};
-use crate::stress::Measure;
+use crate::stress::StressMethod;
 use harness::output::csv;
 use harness::output::picture::{LegendPlace, LinePlot, Series};
 use polycore::Error;
@@ -29,7 +29,9 @@ pub fn draw_curves(scene: &Scene, outcomes: &[VariantOutcome], output: &Path) ->
     let mut cost = LinePlot::new("Error against run time").log_x().log_y().size(1000.0, 560.0);
     cost = cost.axes("build + solve + stress (s)", error_axis);
     let mut rows: Vec<Vec<f64>> = vec![Vec::new(); 5];
-    for (index, measure) in stress.measures.iter().enumerate().filter(|(_, m)| **m != Measure::AsPublished) {
+    for (index, measure) in
+        stress.measures.iter().enumerate().filter(|(_, m)| **m != StressMethod::AsPublished)
+    {
         let name = measure.name();
         let mut convergence = LinePlot::new(&format!("Stress error of the plate with a hole, {name}"));
         convergence = convergence.log_x().log_y().size(900.0, 500.0);

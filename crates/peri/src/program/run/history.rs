@@ -4,7 +4,7 @@ use super::outcome::VariantOutcome;
 use crate::probe::envelope;
 use crate::program::observe::{damped_energy, is_dynamic};
 use crate::program::scene::Scene;
-use crate::solver::{Event, Record};
+use crate::solver::{BreakingEvent, StepRecord};
 use harness::output::csv;
 use harness::output::picture::{LegendPlace, LinePlot, Series};
 use polycore::Error;
@@ -23,7 +23,7 @@ impl VariantOutcome {
 
     /// Returns the steps as columns.
     pub fn columns(&self) -> Vec<HistoryColumn> {
-        let each = |get: &dyn Fn(&Record) -> f64| self.history.iter().map(get).collect();
+        let each = |get: &dyn Fn(&StepRecord) -> f64| self.history.iter().map(get).collect();
         let mut columns: Vec<HistoryColumn> = Vec::new();
         columns.extend([
             ("displacement".to_owned(), "m".to_owned(), each(&|r| r.displacement)),
@@ -58,7 +58,7 @@ impl VariantOutcome {
             columns.push(("friction_work".to_owned(), "J".to_owned(), each(&|r| r.rubbed)));
         }
         for (index, plane) in self.planes.iter().enumerate() {
-            let resting = |r: &Record| r.resting.get(index).copied().unwrap_or_default();
+            let resting = |r: &StepRecord| r.resting.get(index).copied().unwrap_or_default();
             for (d, axis) in ["x", "y", "z"].iter().enumerate() {
                 let values = each(&|r| resting(r).force[d]);
                 if values.iter().any(|&v| v != 0.0) {
@@ -109,8 +109,8 @@ pub fn peak_lines(outcomes: &[VariantOutcome]) -> String {
         let (at, name) = (outcome.history[peak].displacement, &outcome.name);
         let load = outcome.history[peak].load;
         let near = [peak.checked_sub(1), Some(peak + 1)];
-        let near: Vec<&Record> = near.into_iter().filter_map(|row| outcome.history.get(row?)).collect();
-        let gap = |r: &&Record| [(r.displacement - at).abs(), (r.load - load).abs()];
+        let near: Vec<&StepRecord> = near.into_iter().filter_map(|row| outcome.history.get(row?)).collect();
+        let gap = |r: &&StepRecord| [(r.displacement - at).abs(), (r.load - load).abs()];
         let gaps: Vec<[f64; 2]> = near.iter().map(gap).collect();
         let broken = outcome.history[peak].broken;
         let [apart, least] = match (&near[..], &gaps[..]) {
@@ -177,7 +177,7 @@ pub fn write(scene: &Scene, outcomes: &[VariantOutcome], output: &Path) -> Resul
         csv::write(output.join(format!("envelope_{}.csv", outcome.file_name())), &columns)?;
     }
     for outcome in outcomes.iter().filter(|outcome| !outcome.events.is_empty()) {
-        let each = |get: &dyn Fn(&Event) -> f64| outcome.events.iter().map(get).collect::<Vec<f64>>();
+        let each = |get: &dyn Fn(&BreakingEvent) -> f64| outcome.events.iter().map(get).collect::<Vec<f64>>();
         let (step, load) = (each(&|e| e.step as f64 + 1.0), each(&|e| e.load));
         let bonds = each(&|e| e.bonds as f64);
         let columns = [("step", "", &step[..]), ("load_before", "N", &load), ("bonds", "", &bonds)];

@@ -18,7 +18,7 @@ use crate::error::Error;
 use crate::program::observe::{self, FieldFrames, Moment, Physics, SceneObservers, in_space};
 use crate::program::quantities as q;
 use crate::program::scene::{self, NAMING, Scene, SceneVariant};
-use crate::solver::{Breaking, Method, Record, State, Status, System, load_stepping};
+use crate::solver::{Breaking, Method, State, Status, StepRecord, System, load_stepping};
 use harness::case::{Fault, Run, Step, StepField};
 use harness::observe::{Outputs, Scalars};
 use harness::report::{Phases, Report};
@@ -258,7 +258,8 @@ fn solve<const D: usize>(
         Some(contact) => {
             let planes = contact.planes(source, scene.dynamics.is_some()).map_err(PeriFailure::from)?;
             let whole = material.longitudinal_modulus(&*body.bonds);
-            let modulus = Property::new(&*body.bonds, |site, _| whole * physics.body.stiffness.at(site));
+            let modulus =
+                Property::new(&*body.bonds, |site, _| whole * physics.body.stiffness.value_at(site));
             let held = physics.held.as_deref();
             let tied = held.map(|held| (held, contact.tie_stiffness(scene.dynamics.is_some())));
             Some(contact.contact(planes, body, material.micromodulus(&*body.bonds), &modulus, tied)?)
@@ -306,7 +307,7 @@ fn step_data<const D: usize>(bonds: &dyn Bonds<D>, state: &State<D>) -> Step {
         StepField { name, unit: "m", components: 3, data: each.collect() }
     };
     Step {
-        values: Record::SCALARS.map(|(name, unit, get)| (name, unit, get(record))).to_vec(),
+        values: StepRecord::SCALARS.map(|(name, unit, get)| (name, unit, get(record))).to_vec(),
         fields: vec![
             of_particles("position", &|site| bonds.position(site)),
             of_particles("displacement", &|site| state.displacement.get(site)),

@@ -2,7 +2,7 @@
 
 use crate::bonds::{Bonds, Fragment};
 use crate::program::scene::SceneVariant;
-use crate::solver::{Event, Record, State};
+use crate::solver::{BreakingEvent, State, StepRecord};
 use harness::observe::Curve;
 use harness::report::{Named, Phases};
 use harness::study::Solved;
@@ -24,9 +24,9 @@ pub struct VariantOutcome {
     /// Named profiles.
     pub profiles: Vec<Profile>,
     /// History of load steps.
-    pub history: Vec<Record>,
+    pub history: Vec<StepRecord>,
     /// Breaking events in their order.
-    pub events: Vec<Event>,
+    pub events: Vec<BreakingEvent>,
     /// Fragments, the largest first.
     pub fragments: Vec<Fragment>,
     /// True if the load was lowered after bonds broke, see `solver.snap_back`.

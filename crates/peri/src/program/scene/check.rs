@@ -5,7 +5,7 @@ use super::variant::{SceneVariant, variants};
 use super::{HORIZON_RATIO, HistoryProbe, Scene, SolverMethod, Track, VaryingParameter};
 use crate::calibrate::{Calibration, Space};
 use crate::solver::Policy;
-use crate::stress::Measure;
+use crate::stress::StressMethod;
 use harness::scene::{SceneError, Source};
 
 /// Largest number of history rows of a run in time.
@@ -233,7 +233,7 @@ fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     };
     positive(source, "material.youngs_modulus", youngs_modulus.si(), "Pa")?;
     if let Some(index) =
-        scene.stress.iter().flat_map(|stress| &stress.measures).position(|&m| m == Measure::Constitutive)
+        scene.stress.iter().flat_map(|stress| &stress.measures).position(|&m| m == StressMethod::Constitutive)
     {
         let key = format!("stress.measures[{index}]");
         return Err(source.error(
@@ -268,7 +268,7 @@ fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             let why = "bond laws have no strength; [material.solid] has";
             return Err(source.unexpected("material.critical.strength", why));
         }
-        let given = critical.given();
+        let given = critical.alternatives();
         if given.len() != 1 {
             let found = given.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(" and ");
             let found = if found.is_empty() { "none of them".to_owned() } else { found };

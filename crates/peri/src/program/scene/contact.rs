@@ -5,7 +5,7 @@ use super::values::{DiscreteBody, plain, vector};
 use super::{Scene, SolverMethod};
 use crate::bonds::{Bonds, Property};
 use crate::calibrate::Space;
-use crate::contact::{Contact, Interface, PAIR_STIFFNESS, PLANE_STIFFNESS, Plane, grips};
+use crate::contact::{Contact, GripInterface, PAIR_STIFFNESS, PLANE_STIFFNESS, RigidPlane, grips};
 use crate::error::Error;
 use crate::solver::Loads;
 use harness::scene::{SceneError, Source, check_name};
@@ -123,7 +123,7 @@ impl ContactSpec {
         key: &str,
         spec: &PlaneSpec,
         explicit: bool,
-    ) -> Result<Plane<D>, SceneError> {
+    ) -> Result<RigidPlane<D>, SceneError> {
         let (point, normal) = plane_of(source, key, &spec.point, &spec.normal)?;
         let none = [0.0; D];
         let displacement = spec.displacement.as_ref();
@@ -139,7 +139,7 @@ impl ContactSpec {
                 })?
             }
         };
-        Ok(Plane {
+        Ok(RigidPlane {
             point,
             normal,
             stiffness: self.stiffness_of(spec, explicit),
@@ -159,7 +159,7 @@ impl ContactSpec {
         &self,
         source: &Source,
         explicit: bool,
-    ) -> Result<Vec<Plane<D>>, SceneError> {
+    ) -> Result<Vec<RigidPlane<D>>, SceneError> {
         let each = self.plane.iter().enumerate();
         each.map(|(index, plane)| self.plane_in(source, &format!("contact.plane[{index}]"), plane, explicit))
             .collect()
@@ -171,7 +171,7 @@ impl ContactSpec {
     /// As [`Contact::with_planes`]; none after [`super::check`].
     pub fn contact<const D: usize>(
         &self,
-        planes: Vec<Plane<D>>,
+        planes: Vec<RigidPlane<D>>,
         body: &DiscreteBody<D>,
         micromodulus: f64,
         modulus: &Property,
@@ -187,7 +187,7 @@ impl ContactSpec {
         let (Some((held, stiffness)), Some(lattice)) = (tied, bonds.as_lattice()) else {
             return contact.with_planes(bonds, &outside, modulus.clone(), planes);
         };
-        let interface = Interface::new(lattice, held);
+        let interface = GripInterface::new(lattice, held);
         let surface = outside.clone().bounded_by(&interface.surface);
         contact.with_planes(bonds, &surface, modulus.clone(), planes)?.with_tied(
             lattice,

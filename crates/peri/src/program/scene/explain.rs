@@ -4,7 +4,7 @@ use super::values::plain;
 use super::variant::SceneVariant;
 use super::{Boundary, DiscreteBody, Scene, SolverMethod, SurfaceCorrection};
 use crate::bonds::VolumeCorrection;
-use crate::material::Point;
+use crate::material::SolidPoint;
 use crate::solver::Criterion;
 use harness::report::Named;
 use harness::scene::{SceneError, Source};
@@ -40,7 +40,7 @@ pub fn explain<const D: usize>(
         (bonds.sites() * (3 * D + 1) * 8) as f64 / 1e6
     ));
     if let Some(solid) = &scene.material.solid {
-        let states = (bonds.sites() * size_of::<Point<D>>()) as f64 / 1e6;
+        let states = (bonds.sites() * size_of::<SolidPoint<D>>()) as f64 / 1e6;
         builds(format!("a solid, `{}`: states of particles {states:.1} MB", solid.law.name()));
     }
     for (crack, severed) in scene.body.cracks.iter().zip(&body.severed) {

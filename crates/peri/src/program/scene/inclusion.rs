@@ -81,13 +81,16 @@ impl<'a, const D: usize> Inclusions<'a, D> {
         let mut stiffness = vec![1.0; if varies { bonds.sites() } else { 0 }];
         if let Some((values, whole)) = modulus {
             bonds.particles().iter().for_each(|&site| {
-                stiffness[site as usize] = values.at(site as usize) / whole.si();
+                stiffness[site as usize] = values.value_at(site as usize) / whole.si();
             });
         }
         let shrinks = scene.material.is_prestrained();
         let mut prestrain = vec![0.0; if shrinks { bonds.sites() } else { 0 }];
         if let Some(values) = following(VaryingParameter::Prestrain).filter(|_| stressed.is_none()) {
-            bonds.particles().iter().for_each(|&site| prestrain[site as usize] = values.at(site as usize));
+            bonds
+                .particles()
+                .iter()
+                .for_each(|&site| prestrain[site as usize] = values.value_at(site as usize));
         }
         for (index, inclusion) in scene.material.inclusions.iter().enumerate() {
             let key = format!("material.inclusions[{index}].shape");
@@ -144,9 +147,9 @@ impl<'a, const D: usize> Inclusions<'a, D> {
         let mut stretch = vec![rest; if varies { bonds.sites() } else { 0 }];
         if let Some(energies) = &self.fracture_energy {
             for site in bonds.particles().iter().map(|&site| site as usize) {
-                let energy = Some(EnergyPerArea::from_si(energies.at(site)));
+                let energy = Some(EnergyPerArea::from_si(energies.value_at(site)));
                 let critical = Critical { fracture_energy: energy, ..Critical::default() };
-                stretch[site] = resolve(critical, self.micromodulus.at(site)).map_err(|error| {
+                stretch[site] = resolve(critical, self.micromodulus.value_at(site)).map_err(|error| {
                     source.error("material.fields", error, "a fracture energy that bonds can have")
                 })?;
             }
@@ -161,7 +164,7 @@ impl<'a, const D: usize> Inclusions<'a, D> {
             // neighbours of equal stiffness share one bisection
             let mut last = None;
             for &site in members {
-                let stiffness = self.micromodulus.at(site as usize);
+                let stiffness = self.micromodulus.value_at(site as usize);
                 let own = match last {
                     Some((before, own)) if before == stiffness => own,
                     _ => resolve(critical, stiffness).map_err(fault)?,
@@ -209,7 +212,7 @@ impl<'a, const D: usize> Inclusions<'a, D> {
             // relative micromodulus of the rest at this end
             let inside = |place| near.iter().filter(move |&&index| self.each[index].1.contains(place));
             let stiffness = |place| inside(place).map(|&index| self.each[index].0.stiffness).product::<f64>();
-            let rest = self.micromodulus.at(site as usize) / stiffness(here);
+            let rest = self.micromodulus.value_at(site as usize) / stiffness(here);
             let mut others = Vec::new();
             bonds.neighbours(site as usize, &mut |bond| {
                 if site < bond.site as u32 {

@@ -5,8 +5,8 @@ use super::region::region;
 use super::values::{DiscreteBody, ONE_OF_THEM};
 use super::{Boundary, ContactSpec, Prescribed, PrescribedField, Scene, Side, SolverMethod};
 use crate::field::Field;
-use crate::material::{Tensor, surface_load};
-use crate::solver::{Adrift, INVERTS, Loads, Stops, Support, adrift, inverted};
+use crate::material::{BodyTensor, surface_load};
+use crate::solver::{ContactStops, INVERTS, Loads, Support, Unsupported, find_unsupported, inverted};
 use harness::scene::{SceneError, Source};
 
 /// Returns the loads and supports of a body, and by site whether a load or support acts there.
@@ -76,7 +76,7 @@ fn add_traction<const D: usize>(
     let bounds = [body.bounds.0[axis], body.bounds.1[axis]];
     let reach = (2.0 * body.bonds.horizon()).min(0.5 * (bounds[1] - bounds[0]));
     let sign = if upper { 1.0 } else { -1.0 };
-    let stress = Tensor::from_fn(|a, b| if b == axis { sign * traction[a] } else { 0.0 });
+    let stress = BodyTensor::from_fn(|a, b| if b == axis { sign * traction[a] } else { 0.0 });
     let surface = surface_load(&*body.bonds, stress);
     let field = loads.body_force.get_or_insert_with(|| Field::zeros(body.bonds.sites()));
     for &site in body.bonds.particles() {
@@ -177,15 +177,17 @@ fn refuse_unbalanced<const D: usize>(
     let planes =
         scene.contact.as_ref().map_or(Ok(Vec::new()), |contact| contact.planes::<D>(source, false))?;
     let normals = planes.iter().map(|plane| plane.normal).collect();
-    let stops = Stops {
+    let stops = ContactStops {
         normals,
         pairs: scene.contact.is_some(),
         rubs: scene.contact.as_ref().is_some_and(ContactSpec::has_friction)
             || planes.iter().any(|plane| plane.bonded),
     };
-    let Some(part) = adrift(&*body.bonds, loads, None, &stops, scene.tolerance()) else { return Ok(()) };
-    let Adrift { particles, of, force, axis, .. } = &part;
-    let found = if particles == of {
+    let Some(part) = find_unsupported(&*body.bonds, loads, None, &stops, scene.tolerance()) else {
+        return Ok(());
+    };
+    let Unsupported { particles, total, force, axis, .. } = &part;
+    let found = if particles == total {
         format!("a total force of {force:.3e} N along {axis}, along which no displacement is prescribed")
     } else {
         part.to_string()

@@ -5,8 +5,8 @@
 
 use super::{Scene, SolverMethod};
 use crate::bonds::{Bonds, Stencil, storage};
-use crate::material::Point;
-use crate::solver::{Lbfgs, Record};
+use crate::material::SolidPoint;
+use crate::solver::{Lbfgs, StepRecord};
 use harness::scene::{SceneError, Source};
 use polycore::constitutive::Flags;
 use polycore::memory::{available, gib};
@@ -68,7 +68,7 @@ fn bytes_of_sites<const D: usize>(scene: &Scene, sites: f64, stencil: usize) -> 
     }
     if scene.material.solid.is_some() {
         // states of particles, while they are made, and another set for outputs
-        let (state, passes) = (size_of::<Point<D>>() as f64, 8.0 * (1 + D * D) as f64 + 5.0);
+        let (state, passes) = (size_of::<SolidPoint<D>>() as f64, 8.0 * (1 + D * D) as f64 + 5.0);
         each += if scene.observes_forces() { 3.0 * state + 2.0 * passes } else { 2.0 * state + passes };
     }
     if scene.material.critical.is_some() {
@@ -103,7 +103,7 @@ fn bytes_of_results<const D: usize>(scene: &Scene, particles: f64) -> f64 {
         None => scene.solver.steps,
     };
     // a row of history and its copy in a checkpoint
-    let row = size_of::<Record>() + 24 * scene.boundary.len() + 48 * scene.output.section.len();
+    let row = size_of::<StepRecord>() + 24 * scene.boundary.len() + 48 * scene.output.section.len();
     // a table: arc length, position twice, every column; near particles and their cells
     let points = scene.output.line.iter().map(|line| line.points).max().unwrap_or(0) as f64;
     let line = points * 8.0 * (2.0 + 4.0 * D as f64 + 2.0 * measures * (D * D) as f64);

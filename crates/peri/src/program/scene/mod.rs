@@ -57,7 +57,7 @@ use crate::bonds::VolumeCorrection;
 use crate::calibrate::{Calibration, Space};
 use crate::critical::{Convention, Critical};
 use crate::potential::Law;
-use crate::stress::{BallVolume, Measure};
+use crate::stress::{BallVolume, StressMethod};
 use harness::report::Expect;
 use harness::scene::{LineSpec, SolidSpec};
 use harness::study::{Compare, Comparisons, Convergence, ErrorAgainstTime};
@@ -299,7 +299,7 @@ pub enum SurfaceCorrection {
 #[serde(deny_unknown_fields)]
 pub struct StressSpec {
     /// Measures to compute; the first is drawn.
-    pub measures: Vec<Measure>,
+    pub measures: Vec<StressMethod>,
     /// Volume of the averaging ball of `ball-share`.
     #[serde(default)]
     pub ball: BallVolume,

@@ -2,7 +2,7 @@
 
 use super::values::DiscreteBody;
 use super::{Scene, SolverMethod};
-use crate::contact::Plane;
+use crate::contact::RigidPlane;
 use harness::scene::{SceneError, Source};
 use polycore::numerics::range;
 
@@ -20,7 +20,7 @@ const MOMENTS: u32 = 100;
 /// Plane of a scene with a unit normal, and the range of the particles' heights above it, m.
 struct PlanePosition<const D: usize> {
     name: String,
-    plane: Plane<D>,
+    plane: RigidPlane<D>,
     low: f64,
     high: f64,
     /// Height of the lowest point of the surface above the plane, m.
@@ -30,7 +30,7 @@ struct PlanePosition<const D: usize> {
 impl<const D: usize> PlanePosition<D> {
     /// Returns the displacement of the plane along its normal, m, at a load factor and a time, s.
     fn displacement(&self, factor: f64, time: f64) -> f64 {
-        let Plane { normal, displacement, velocity, .. } = self.plane;
+        let RigidPlane { normal, displacement, velocity, .. } = self.plane;
         (0..D).map(|d| normal[d] * (factor * displacement[d] + time * velocity[d])).sum()
     }
 }

@@ -5,7 +5,7 @@ use super::region::region;
 use super::values::{DiscreteBody, ONE_OF_THEM, plain, vector};
 use super::{Boundary, Prescribed, PrescribedField, Scene};
 use crate::bonds::Bonds;
-use crate::solver::{Loads, Rotation, Support, Turned};
+use crate::solver::{Loads, RotatingRegion, Rotation, Support};
 use harness::scene::{SceneError, Source};
 use nalgebra::{DMatrix, SMatrix};
 
@@ -88,7 +88,7 @@ pub(super) fn turn<const D: usize>(
                 }
             }
             let bit = |d: usize| u8::from(support.displacement[d].is_some()) << d;
-            let turned = Turned {
+            let turned = RotatingRegion {
                 rotation,
                 shift: support.displacement.map(|component| component.unwrap_or(0.0)),
                 components: (0..D).map(bit).sum(),

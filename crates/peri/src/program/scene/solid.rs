@@ -6,8 +6,8 @@ use super::values::{plain, positive};
 use crate::bonds::VolumeCorrection;
 use crate::calibrate::{Calibration, Space};
 use crate::error::Error;
-use crate::material::{Correspondence, EightChain, PointLaw};
-use crate::stress::Measure;
+use crate::material::{Correspondence, EightChainSolid, PointLaw};
+use crate::stress::StressMethod;
 use harness::scene::{ConstitutiveSpec, SceneError, Source};
 use polycore::constitutive::surrogate::Kind;
 use polycore::units::Stress;
@@ -119,7 +119,7 @@ impl SolidLaw {
                     return Err(missing("bulk_modulus", why));
                 }
             };
-            let network = EightChain::new(space, shear.si(), links, bulk).map_err(wrong)?;
+            let network = EightChainSolid::new(space, shear.si(), links, bulk).map_err(wrong)?;
             let volumetric = space != Space::PlaneStress && planes;
             let stiff = volumetric && bulk >= FILTERED_RATIO * shear.si();
             if !self.pressure_filter.unwrap_or(stiff) {
@@ -188,12 +188,12 @@ pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<
             }
         }
         let allowed = "either `stretch`, above 1, or `fracture_energy`, above 0";
-        let found = match (critical.given().len(), critical.stretch, critical.fracture_energy) {
+        let found = match (critical.alternatives().len(), critical.stretch, critical.fracture_energy) {
             (1, Some(stretch), _) if stretch > 1.0 && stretch.is_finite() => None,
             (1, _, Some(energy)) if energy.si() > 0.0 && energy.si().is_finite() => None,
             (1, Some(stretch), _) => Some(format!("a stretch of {}", plain(stretch))),
             (1, _, Some(energy)) => Some(format!("{} J/m²", plain(energy.si()))),
-            _ => Some(format!("`{}` of a solid", critical.given().join("` and `"))),
+            _ => Some(format!("`{}` of a solid", critical.alternatives().join("` and `"))),
         };
         if let Some(found) = found {
             return Err(source.error("material.critical", found, allowed));
@@ -204,8 +204,11 @@ pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<
         let allowed = "false: points of a cloud have no nearest neighbours";
         return Err(source.error(&format!("{KEY}.pressure_filter"), "true", allowed));
     }
-    let other =
-        scene.stress.iter().flat_map(|stress| &stress.measures).position(|&m| m != Measure::Constitutive);
+    let other = scene
+        .stress
+        .iter()
+        .flat_map(|stress| &stress.measures)
+        .position(|&m| m != StressMethod::Constitutive);
     if let Some(index) = other {
         let allowed = "`constitutive`, the stress of the law itself";
         return Err(source.error(&format!("stress.measures[{index}]"), "a measure of bond forces", allowed));

@@ -2,7 +2,7 @@
 
 use crate::bonds::Bonds;
 use crate::geometry::{Cut, Gaps, Operation};
-use crate::surface::Surface;
+use crate::surface::BodySurface;
 use harness::scene::{SceneError, Source};
 use polycore::units::Length;
 
@@ -32,11 +32,13 @@ pub struct DiscreteBody<const D: usize> {
 
 impl<const D: usize> DiscreteBody<D> {
     /// Returns the face points of its surface: of its shapes, else of its lattice; none of a cloud.
-    pub fn surface(&self) -> Surface<D> {
+    pub fn surface(&self) -> BodySurface<D> {
         match self.bonds.as_lattice() {
-            _ if !self.operations.is_empty() => Surface::of_shapes(&self.operations, self.bonds.spacing()),
-            Some(lattice) => Surface::of_lattice(lattice),
-            None => Surface::default(),
+            _ if !self.operations.is_empty() => {
+                BodySurface::of_shapes(&self.operations, self.bonds.spacing())
+            }
+            Some(lattice) => BodySurface::of_lattice(lattice),
+            None => BodySurface::default(),
         }
     }
 }

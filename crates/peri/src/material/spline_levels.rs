@@ -1,40 +1,41 @@
-//! A preconditioner for operators that act on smooth fields like ∫(Δθ)²: splines on grids, each twice as wide as the one before (Bramble,
-//! Pasciak & Xu 1990, doi:10.1090/S0025-5718-1990-1023042-6).
+//! Preconditioner for operators that act on smooth fields like ∫(Δθ)²: splines on grids, each twice as wide
+//! as the one before (Bramble, Pasciak & Xu 1990, doi:10.1090/S0025-5718-1990-1023042-6).
 
 use super::tensor::Vector;
 use crate::bonds::{BodyGeometry, CloudBonds};
 use polycore::numerics::bounds;
 use rayon::prelude::*;
 
-/// The finest grid in spacings: 40 % more iterations at twice that.
+/// Width of the finest grid in spacings: twice that takes 40 % more iterations.
 const FINEST: f64 = 1.0;
 
 /// Grids over a cloud, from the finest on.
-pub(super) struct Levels<const D: usize> {
+pub(super) struct SplineLevels<const D: usize> {
     low: [f64; D],
     width: f64,
-    grids: Vec<Grid<D>>,
+    grids: Vec<SplineGrid<D>>,
 }
 
-/// Products of quadratic splines, one about the middle of each cell, the first axis fastest.
-struct Grid<const D: usize> {
+/// Products of quadratic splines, one around the middle of each cell, the first axis fastest.
+struct SplineGrid<const D: usize> {
     cells: [usize; D],
-    /// 1/∫(Δb)² of a spline all of whose particles are inside; 0 of others.
+    /// 1/∫(Δb)² of a spline whose particles are all inside; 0 for others.
     weights: Vec<f64>,
     values: Vec<Vector<D>>,
 }
 
-impl<const D: usize> Levels<D> {
-    /// For fields that are zero outside of `inside`, and an operator `stiffness`·∫(Δθ)² of smooth ones.
+impl<const D: usize> SplineLevels<D> {
+    /// Builds the grids for fields that are zero outside of `inside`, and an operator `stiffness`·∫(Δθ)² on
+    /// smooth fields.
     pub(super) fn new(cloud: &CloudBonds<D>, inside: &[bool], stiffness: f64) -> Self {
         let [low, high] = bounds((0..cloud.sites()).map(|site| cloud.position(site)));
         let mut width = FINEST * cloud.spacing();
         // a cell and more around the body, for the splines at its ends
         let cells: [usize; D] = std::array::from_fn(|d| ((high[d] - low[d]) / width) as usize + 4);
         let mut levels = Self { low: low.map(|x| x - 1.5 * width), width, grids: Vec::new() };
-        let mut grid = Grid::new(cells);
+        let mut grid = SplineGrid::new(cells);
         for site in (0..cloud.sites()).filter(|&site| !inside[site]) {
-            levels.at(cells, cloud.position(site), |node, _| grid.weights[node] = 0.0);
+            levels.visit_splines(cells, cloud.position(site), |node, _| grid.weights[node] = 0.0);
         }
         loop {
             let coarse = grid.coarser();
@@ -50,13 +51,13 @@ impl<const D: usize> Levels<D> {
         }
     }
 
-    /// Adds what the grids make of a residual.
+    /// Adds the correction of all grids to a residual.
     pub(super) fn add(&mut self, cloud: &CloudBonds<D>, residual: &[Vector<D>], to: &mut [Vector<D>]) {
         let Some(finest) = self.grids.first_mut() else { return };
         let (cells, mut values) = (finest.cells, std::mem::take(&mut finest.values));
         values.fill(Vector::zeros());
         for (site, residual) in residual.iter().enumerate() {
-            self.at(cells, cloud.position(site), |node, weight| values[node] += residual * weight);
+            self.visit_splines(cells, cloud.position(site), |node, weight| values[node] += residual * weight);
         }
         self.grids[0].values = values;
         for k in 1..self.grids.len() {
@@ -78,13 +79,15 @@ impl<const D: usize> Levels<D> {
         }
         let (this, finest) = (&*self, &self.grids[0]);
         to.par_iter_mut().enumerate().for_each(|(site, to)| {
-            this.at(cells, cloud.position(site), |node, weight| *to += finest.values[node] * weight);
+            this.visit_splines(cells, cloud.position(site), |node, weight| {
+                *to += finest.values[node] * weight
+            });
         });
     }
 
-    /// Visits the splines of the finest grid at a place.
+    /// Visits the splines of the finest grid at a position.
     #[inline]
-    fn at(&self, cells: [usize; D], place: [f64; D], mut visit: impl FnMut(usize, f64)) {
+    fn visit_splines(&self, cells: [usize; D], place: [f64; D], mut visit: impl FnMut(usize, f64)) {
         let (mut first, mut stride, mut strides) = (0, 1, [0; D]);
         let mut weights = [[0.0; 3]; D];
         for d in 0..D {
@@ -107,13 +110,13 @@ impl<const D: usize> Levels<D> {
     }
 }
 
-impl<const D: usize> Grid<D> {
+impl<const D: usize> SplineGrid<D> {
     fn new(cells: [usize; D]) -> Self {
         let count = cells.iter().product();
         Self { cells, weights: vec![1.0; count], values: vec![Vector::zeros(); count] }
     }
 
-    /// Cells twice as wide; of its splines those that no spline of weight 0 is a part of.
+    /// Coarsens the grid by two; keeps the splines without any part of weight 0.
     fn coarser(&self) -> Self {
         let mut coarse = Self::new(self.cells.map(|count| count.div_ceil(2)));
         let (cells, weights) = (coarse.cells, &mut coarse.weights);
@@ -125,7 +128,8 @@ impl<const D: usize> Grid<D> {
         coarse
     }
 
-    /// Visits each spline with the wider ones that it is a part of: spline c is that of 2c − 1, 2c, 2c + 1 and 2c + 2 with ¼, ¾, ¾ and ¼.
+    /// Visits each spline with the coarser ones that contain it: spline c is that of 2c − 1, 2c, 2c + 1 and
+    /// 2c + 2 with ¼, ¾, ¾ and ¼.
     fn parents(&self, coarse: [usize; D], mut visit: impl FnMut(usize, usize, f64)) {
         let mut place = [0_usize; D];
         for node in 0..self.weights.len() {
@@ -133,7 +137,7 @@ impl<const D: usize> Grid<D> {
                 let (mut parent, mut weight, mut stride, mut exists) = (0, 1.0, 1, true);
                 for d in 0..D {
                     let near = k >> d & 1 == 0;
-                    // the farther one is the next of an odd spline, and the last of an even one
+                    // the farther one is the next for an odd spline, the last for an even one
                     let at = match (near, place[d] % 2) {
                         (true, _) => place[d] / 2,
                         (false, 1) => place[d] / 2 + 1,

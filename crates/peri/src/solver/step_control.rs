@@ -1,4 +1,4 @@
-//! Load steps of a state: how far they are, where they have been cut, and the last one that can be gone back to.
+//! Load steps of a state: their progress, their cuts, and the last one to which a run can return.
 
 use super::fracture::Fracture;
 use crate::field::Field;
@@ -9,26 +9,27 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "")]
 pub struct StepControl<const D: usize> {
-    /// Whether this step's first guess is made.
+    /// True if this step's first guess is made.
     pub(super) predicted: bool,
     /// Equilibria found in this step.
     pub round: u64,
-    /// Displacements of the two equilibria before the last, where no bond has broken since.
+    /// Displacements of the two equilibria before the last, if no bond has broken since.
     pub(super) past: Vec<Field<D>>,
     /// Factor, and the loads' conjugate sums, at the last equilibrium.
     pub(super) balanced: [f64; 3],
-    /// Load factors of all steps, where steps have been cut …
+    /// Load factors of all steps, if steps have been cut …
     pub(super) factors: Vec<f64>,
-    /// … which of them nobody has prescribed, and how often the present one has been.
+    /// … which of them were inserted, and how often the present one was cut.
     pub(super) inserted: Vec<usize>,
     pub(super) cuts: u32,
-    /// Factor and largest stretch of the equilibrium from which the load was lowered, see [`System::snap_back`](super::System::snap_back).
+    /// Factor and largest stretch of the equilibrium from which the load was lowered, see
+    /// [`System::snap_back`](super::System::snap_back).
     pub(super) lowered: Option<[f64; 2]>,
     /// The last finished step under given forces, which may tear the body apart.
     pub(super) accepted: Option<Box<Accepted<D>>>,
 }
 
-/// A finished step, as far as the history does not have it.
+/// A finished step, without the data in the history.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "")]
 pub(super) struct Accepted<const D: usize> {
@@ -39,7 +40,7 @@ pub(super) struct Accepted<const D: usize> {
 }
 
 impl<const D: usize> StepControl<D> {
-    /// Puts load factors before that of the step `at`.
+    /// Inserts load factors before that of the step `at`.
     pub(super) fn insert(&mut self, at: usize, factors: &[f64], new: &[f64]) {
         let count = new.len();
         self.factors = factors.to_vec();
@@ -49,7 +50,8 @@ impl<const D: usize> StepControl<D> {
         self.inserted.sort_unstable();
     }
 
-    /// How many prescribed steps are over after the first `rows` of the history, the last of which is one of them.
+    /// Number of prescribed steps finished in the first `rows` of the history; `None` if the last row is not
+    /// the end of one.
     pub fn prescribed(&self, rows: usize) -> Option<usize> {
         let last = rows.checked_sub(1)?;
         let inserted = self.inserted.partition_point(|&row| row < last);

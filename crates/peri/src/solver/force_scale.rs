@@ -1,4 +1,4 @@
-//! What forces are measured by, and what sums of them a row of history holds.
+//! Reference scale of forces, and force sums of a history row.
 
 use super::load::Loads;
 use crate::bonds::BodyGeometry;
@@ -7,12 +7,12 @@ use polycore::numerics::{bounds, ordered_sum};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Part of the grips' bond forces under the strain U/L.
+/// Fraction of the grips' bond forces under the strain U/L.
 const LEAST_STRAIN: f64 = 0.01;
 
-/// What a body's forces are measured by, beside its reactions: of the body as it was built.
+/// Reference scale of a body's forces besides its reactions, in the reference state.
 #[derive(Clone, Debug, Default)]
-pub struct Scale {
+pub struct ForceScale {
     /// s of each site, N/m⁴.
     springs: Vec<f64>,
     /// U at load factor 1, m, and L, m.
@@ -23,8 +23,8 @@ pub struct Scale {
     pub(super) held_sum: f64,
 }
 
-impl Scale {
-    /// Of a body with its loads; `stiffness` is kθK.
+impl ForceScale {
+    /// Measures a body with its loads; `stiffness` is kθK.
     pub fn new<const D: usize>(bonds: &dyn BodyGeometry<D>, loads: &Loads<D>, stiffness: f64) -> Self {
         let of = |&site: &u32| {
             let mut sum = 0.0;
@@ -69,15 +69,15 @@ impl Scale {
     }
 }
 
-/// Sums over the whole body in equilibrium. The first two vanish by Newton's third law, whatever the residual: bonds and
-/// contact pull both ends with one force, along the line between them.
+/// Sums over the whole body in equilibrium. The first two vanish by Newton's third law, whatever the
+/// residual: bonds and contact pull both ends with equal forces, along the line between them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Balance {
     /// |Σ V F| of the internal forces F, N.
     pub force: f64,
     /// |Σ V x × F| about the body's middle with deformed positions x, N·m.
     pub moment: f64,
-    /// |Σ reactions + Σ loads|, N: what free particles still have out of balance.
+    /// |Σ reactions + Σ loads|, N: remaining imbalance of the free particles.
     pub external: f64,
     /// ½ Σ V |F|, N, and no less than a hundredth of the grips' bond forces under the strain U/L.
     pub size: f64,

@@ -1,9 +1,10 @@
 //! Adaptive dynamic relaxation: damped pseudo-dynamics with unit time step, a fictitious mass from the bonds'
 //! stiffness and a damping from the Rayleigh quotient of the last increment, until the forces balance.
-//! Underwood (1983), in Computational Methods for Transient Analysis; Kilic & Madenci (2010), doi:10.1016/j.tafmec.2010.08.001,
-//! with the quotient taken on increments (the displacement-weighted form has negative stiffness in many iterations).
+//! Underwood (1983), in Computational Methods for Transient Analysis; Kilic & Madenci (2010),
+//! doi:10.1016/j.tafmec.2010.08.001, with the quotient of increments (the displacement-weighted form has
+//! negative stiffness in many iterations).
 
-use super::balance::Goal;
+use super::balance::SearchLimits;
 use super::load_stepping::{Equilibrium, QuasiStatic};
 use super::mass::{has_own_mass, own_mass, update_unit_mass};
 use super::method::Watch;
@@ -14,10 +15,12 @@ use super::system::System;
 use crate::bonds::StretchRange;
 use crate::error::Error;
 
-/// Iterations between looks at the stretches.
-const LOOK: u64 = 10;
+/// Iterations between checks of the stretches.
+const CHECK_INTERVAL: u64 = 10;
 
-/// Settings of the method.
+/// Quasi-static solution by adaptive dynamic relaxation: robust, one force evaluation an iteration, but many
+/// more iterations than [`Lbfgs`](super::Lbfgs). Use it for comparison with published results, and for bodies
+/// that break during an iteration ([`Policy::EveryIteration`](super::Policy)).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DynamicRelaxation {
     /// Out-of-balance force over reference force at which a step is converged.
@@ -26,8 +29,8 @@ pub struct DynamicRelaxation {
     pub max_iterations: u64,
     /// Factor S on the fictitious mass above the Gershgorin bound.
     pub mass_safety: f64,
-    /// A search that has used all its iterations continues if its residual is below this; its residual stays
-    /// in the history.
+    /// Residual below which a search continues after all its iterations are used; the residual is recorded in
+    /// the history.
     pub accept: f64,
 }
 
@@ -38,8 +41,8 @@ impl Default for DynamicRelaxation {
 }
 
 impl DynamicRelaxation {
-    fn goal(&self) -> Goal {
-        Goal { tolerance: self.tolerance, max_iterations: self.max_iterations, accept: self.accept }
+    fn goal(&self) -> SearchLimits {
+        SearchLimits { tolerance: self.tolerance, max_iterations: self.max_iterations, accept: self.accept }
     }
 }
 
@@ -49,30 +52,30 @@ impl<const D: usize> QuasiStatic<D> for DynamicRelaxation {
     }
 }
 
-/// Iterations between looks at the masses, where bonds differ much in their tangent.
+/// Iterations between updates of the masses, if bonds differ much in their tangent.
 const REFRESH: u64 = 10;
 /// Iterations after which a search is a long one, and the least damping towards twice as many.
 const LONG: u64 = 3000;
 const LATE_DAMPING: f64 = 0.05;
 
-/// The method at work.
+/// Solver of [`DynamicRelaxation`].
 pub struct RelaxationSolver {
     settings: DynamicRelaxation,
-    /// Gershgorin sums of the undeformed body for a unit bond tangent; made when first needed.
+    /// Gershgorin sums of the undeformed body for a unit bond tangent; computed when first needed.
     unit_mass: Vec<f64>,
-    /// Gershgorin sums of the deformed body with each bond's own tangent, where bonds differ much in it.
+    /// Gershgorin sums of the deformed body with each bond's own tangent, if bonds differ much in it.
     own_mass: Vec<f64>,
-    /// Either of them with what contact adds in this iteration.
+    /// Either of them plus contact in this iteration.
     contact_mass: Vec<f64>,
 }
 
 impl RelaxationSolver {
-    /// Nothing is computed yet.
+    /// Creates a solver without any computed data.
     pub fn new(settings: DynamicRelaxation) -> Self {
         Self { settings, unit_mass: Vec::new(), own_mass: Vec::new(), contact_mass: Vec::new() }
     }
 
-    /// The Gershgorin sums of this iteration.
+    /// Gershgorin sums of this iteration.
     fn masses<const D: usize>(&self, system: &System<D>, own: bool) -> &[f64] {
         match (system.repulsion(), own) {
             (Some(_), _) => &self.contact_mass,
@@ -81,7 +84,7 @@ impl RelaxationSolver {
         }
     }
 
-    /// One iteration; true where the forces balance (the displacement is then left as it is).
+    /// Runs one iteration; returns true if the forces balance (the displacement then stays).
     fn iterate<const D: usize>(
         &mut self,
         system: &mut System<D>,
@@ -89,10 +92,10 @@ impl RelaxationSolver {
         watch: &mut Watch<D>,
     ) -> Result<bool, Error> {
         let settings = self.settings;
-        // a step's first iterations move farthest: beyond its range a fit must not be followed for long
+        // a step's first iterations move farthest: the fit must not be extrapolated for long
         let look = system.breaks_on_the_way()
-            || state.counts.iteration < LOOK
-            || state.counts.iteration.is_multiple_of(LOOK);
+            || state.counts.iteration < CHECK_INTERVAL
+            || state.counts.iteration.is_multiple_of(CHECK_INTERVAL);
         let factor = system.factors[state.step];
         system.prepare(&state.displacement);
         let own = has_own_mass(system, state);
@@ -110,16 +113,16 @@ impl RelaxationSolver {
         if !sums.is_finite() {
             return Err(system.not_finite(state));
         }
-        state.stretches.see(observed);
+        state.stretches.observe(observed);
         let mut broken = false;
         if look {
-            // after a refit this force still belongs to the old fit, whose range it left by little: go on
+            // after a refit this force still belongs to the old fit, whose range it left by little: continue
             system.widen(state)?;
             if system.breaks_on_the_way() && system.is_overstretched(observed) {
                 let sites = system.break_bonds(state);
                 broken = !sites.is_empty();
-                Equilibrium::broke(self, system, &sites);
-                system.refuse_adrift(state, settings.tolerance)?;
+                Equilibrium::bonds_broke(self, system, &sites);
+                system.refuse_unsupported(state, settings.tolerance)?;
             }
         }
         let quotient = if state.counts.iteration > 0 && sums.quotient_bottom > 0.0 {
@@ -127,17 +130,18 @@ impl RelaxationSolver {
         } else {
             0.0
         };
-        // where bonds soften the quotient is negative and would leave them to swing indefinitely: a long search is damped
+        // with softening bonds the quotient is negative and would let them oscillate indefinitely, so a long
+        // search is damped
         let late = state.counts.iteration.saturating_sub(LONG) as f64 / LONG as f64;
         let damping = (2.0 * quotient.max(0.0).sqrt()).clamp(LATE_DAMPING * late.min(1.0), 1.9);
         let goal = settings.goal();
-        state.note(system, &sums, &goal);
+        state.record_sums(system, &sums, &goal);
         if state.is_balanced(&goal, broken)? {
             return Ok(true);
         }
         move_pass(&system.loads, state, self.masses(system, own), mass, damping);
         if let Some(contact) = system.repulsion() {
-            contact.still(&mut state.velocity);
+            contact.stop_detached(&mut state.velocity);
         }
         state.counts.iterate();
         // masses are rebuilt from the state alone
@@ -165,7 +169,7 @@ impl<const D: usize> Equilibrium<D> for RelaxationSolver {
         Ok(None)
     }
 
-    fn broke(&mut self, system: &System<D>, sites: &[u32]) {
+    fn bonds_broke(&mut self, system: &System<D>, sites: &[u32]) {
         update_unit_mass(&*system.bonds, sites, &mut self.unit_mass);
     }
 

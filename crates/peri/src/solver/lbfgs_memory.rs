@@ -1,24 +1,25 @@
-//! The last steps s and changes of the gradient y, and the direction that follows: Nocedal (1980),
-//! doi:10.1090/S0025-5718-1980-0572855-7, with the recursion carried out on inner products (Chen, Wang & Zhou 2014, NIPS 27),
-//! so that stored fields are read twice an iteration.
+//! The last steps s and changes of the gradient y, and the direction computed from them: Nocedal (1980),
+//! doi:10.1090/S0025-5718-1980-0572855-7, with the recursion carried out on inner products (Chen, Wang & Zhou
+//! 2014, NIPS 27), so that stored fields are read twice an iteration.
 //!
-//! With an initial inverse γB, B the preconditioner, only s and w = B y are stored, in single precision: the pairs make up most of what an
-//! iteration reads, and a direction needs no more. All sums are in double precision.
+//! With an initial inverse γB, B the preconditioner, only s and w = B y are stored, in single precision: the
+//! pairs are most of the memory traffic of an iteration, and a direction needs no more. All sums are in
+//! double precision.
 
+use super::particle_map::in_order;
 use super::passes::{LANES, sum};
-use super::places::in_order;
 use crate::field::{CHUNK, Field, chunk_range};
 use pulp::{Arch, NullaryFnOnce, Simd, WithSimd};
 use std::collections::VecDeque;
 
-/// Entries that are worked on at a time, so that what several pairs need of them stays in the cache.
+/// Entries processed at a time, so that data shared by several pairs stay in the cache.
 const BLOCK: usize = 512;
 
 /// A vector field in single precision.
 type Single<const D: usize> = [Vec<f32>; D];
 
-/// A step, and what it did to the gradient.
-struct Pair<const D: usize> {
+/// A step and the change of the gradient.
+struct StepPair<const D: usize> {
     /// s.
     step: Single<D>,
     /// w = B y.
@@ -33,27 +34,27 @@ struct Pair<const D: usize> {
 }
 
 /// The pairs, oldest first.
-pub struct Memory<const D: usize> {
+pub struct LbfgsMemory<const D: usize> {
     most: usize,
-    pairs: VecDeque<Pair<D>>,
-    /// Fields to use again.
+    pairs: VecDeque<StepPair<D>>,
+    /// Fields to be reused.
     spare: Vec<Single<D>>,
     /// Scale of the initial inverse; 1 until a pair is known.
     scale: f64,
 }
 
-impl<const D: usize> Memory<D> {
-    /// Room for `most` pairs.
+impl<const D: usize> LbfgsMemory<D> {
+    /// Creates a memory for `most` pairs.
     pub fn new(most: usize) -> Self {
         Self { most, pairs: VecDeque::new(), spare: Vec::new(), scale: 1.0 }
     }
 
-    /// Whether no pair is known.
+    /// Returns true if no pair is stored.
     pub fn is_empty(&self) -> bool {
         self.pairs.is_empty()
     }
 
-    /// Forgets all pairs, and the scale where it belongs to another preconditioner.
+    /// Forgets all pairs, and the scale if it belongs to another preconditioner.
     pub fn clear(&mut self, scale_too: bool) {
         for pair in self.pairs.drain(..) {
             self.spare.extend([pair.step, pair.image]);
@@ -63,7 +64,7 @@ impl<const D: usize> Memory<D> {
         }
     }
 
-    /// d = −H g from z = B g; returns g·d.
+    /// Computes d = −H g from z = B g; returns g·d.
     pub fn direction(&self, gradient: &Field<D>, image: &Field<D>, result: &mut Field<D>) -> f64 {
         let count = self.pairs.len();
         // backwards: a_i = s_i·(g − Σ_{j>i} a_j y_j)/(s_i·y_i)
@@ -109,7 +110,7 @@ impl<const D: usize> Memory<D> {
                         let (s, w) = (&pair.step[c][place.clone()], &pair.image[c][place.clone()]);
                         arch.dispatch(Combine { out: &mut *out, scaled: scale * a, w, weight: *weight, s });
                     }
-                    sum += arch.dispatch(Product { a: out, b: g });
+                    sum += arch.dispatch(DotProduct { a: out, b: g });
                 }
             }
             sum
@@ -117,7 +118,8 @@ impl<const D: usize> Memory<D> {
         parts.iter().sum()
     }
 
-    /// Takes note of an accepted step α: s = α d, w = z − z_old, y = g − g_old. Pairs without curvature are not kept.
+    /// Records an accepted step α: s = α d, w = z − z_old, y = g − g_old. Pairs without curvature are
+    /// discarded.
     pub fn add(
         &mut self,
         step: f64,
@@ -155,9 +157,9 @@ impl<const D: usize> Memory<D> {
                     let y = &*change;
                     let mut add = |s: &[f32], w: &[f32], sums: &mut [f64]| {
                         let [wide_s, wide_w] = wide.each_mut().map(|wide| &mut wide[..y.len()]);
-                        arch.dispatch(Widen { from: s, to: &mut *wide_s });
-                        arch.dispatch(Widen { from: w, to: &mut *wide_w });
-                        let products = arch.dispatch(Products { s: wide_s, w: wide_w, y, g });
+                        arch.dispatch(ToDouble { from: s, to: &mut *wide_s });
+                        arch.dispatch(ToDouble { from: w, to: &mut *wide_w });
+                        let products = arch.dispatch(PairProducts { s: wide_s, w: wide_w, y, g });
                         for k in 0..4 {
                             sums[k] += products[k];
                         }
@@ -193,24 +195,24 @@ impl<const D: usize> Memory<D> {
             self.spare.extend([oldest.step, oldest.image]);
         }
         let (later, gradient) = (VecDeque::new(), [sums[2], sums[3]]);
-        self.pairs.push_back(Pair { step: new_step, image: new_image, curvature, size, later, gradient });
+        self.pairs.push_back(StepPair { step: new_step, image: new_image, curvature, size, later, gradient });
     }
 }
 
-/// A field cut into its work items, in order.
+/// Splits a field into its work items, in order.
 fn chunks<const D: usize>(field: &mut Single<D>) -> Vec<[&mut [f32]; D]> {
     let mut iterators = field.each_mut().map(|component| component.chunks_mut(CHUNK));
     let count = iterators[0].len();
     (0..count).map(|_| iterators.each_mut().map(|i| i.next().unwrap_or_default())).collect()
 }
 
-/// Numbers in double precision; sums that widen as they go are not vectorised.
-struct Widen<'a> {
+/// Converts to double precision; sums that convert as they go are not vectorised.
+struct ToDouble<'a> {
     from: &'a [f32],
     to: &'a mut [f64],
 }
 
-impl NullaryFnOnce for Widen<'_> {
+impl NullaryFnOnce for ToDouble<'_> {
     type Output = ();
     #[inline(always)]
     fn call(self) {
@@ -222,14 +224,14 @@ impl NullaryFnOnce for Widen<'_> {
 }
 
 /// s·y, w·y, s·g, w·g.
-struct Products<'a> {
+struct PairProducts<'a> {
     s: &'a [f64],
     w: &'a [f64],
     y: &'a [f64],
     g: &'a [f64],
 }
 
-impl WithSimd for Products<'_> {
+impl WithSimd for PairProducts<'_> {
     type Output = [f64; 4];
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> [f64; 4] {
@@ -282,12 +284,12 @@ impl NullaryFnOnce for Combine<'_> {
 }
 
 /// a·b.
-struct Product<'a> {
+struct DotProduct<'a> {
     a: &'a [f64],
     b: &'a [f64],
 }
 
-impl NullaryFnOnce for Product<'_> {
+impl NullaryFnOnce for DotProduct<'_> {
     type Output = f64;
     #[inline(always)]
     fn call(self) -> f64 {

@@ -1,19 +1,19 @@
-//! Forces of the bonds of one type.
+//! Forces of the bonds of one offset.
 
-use super::Loaded;
+use super::StressInput;
 use super::convolution::lanes;
 use crate::bonds::{BodyGeometry, LatticeBonds, TILE, Weights};
 use crate::potential::KernelFit;
 use pulp::{Arch, Simd, WithSimd};
 
-/// Vectors at a time: those of a tile where they are widest.
+/// Vectors processed at a time: those of a tile at the widest.
 const VECTORS: usize = 2;
 
-/// f V_I V_J, N, of bond `k` from the sites of a chunk on, in tiles that are `filled`; zero where it is not intact. `out` has
-/// [`lanes`] numbers a site.
+/// Computes f V_I V_J, N, of bond `k` from the sites of a chunk on, in tiles that are `filled`; zero if not
+/// intact. `out` has [`lanes`] numbers per site.
 pub fn forces<const D: usize>(
     bonds: &LatticeBonds<D>,
-    state: &Loaded<D>,
+    state: &StressInput<D>,
     k: usize,
     start: usize,
     filled: &[bool],
@@ -34,7 +34,7 @@ pub fn forces<const D: usize>(
         inverse_length: 1.0 / square.sqrt(),
         scale: 2.0 * state.modulus * volume * volume / square.sqrt(),
     };
-    Arch::new().dispatch(Chunk { pull, start, filled, out });
+    Arch::new().dispatch(ForceChunk { pull, start, filled, out });
 }
 
 /// scale·weight·q(e) ζ, from the displacements of both ends.
@@ -50,15 +50,15 @@ struct Pull<'a, const D: usize> {
     scale: f64,
 }
 
-/// A chunk of [`forces`].
-struct Chunk<'a, const D: usize> {
+/// Runs [`forces`] over a chunk.
+struct ForceChunk<'a, const D: usize> {
     pull: Pull<'a, D>,
     start: usize,
     filled: &'a [bool],
     out: &'a mut [f64],
 }
 
-impl<const D: usize> WithSimd for Chunk<'_, D> {
+impl<const D: usize> WithSimd for ForceChunk<'_, D> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
@@ -74,7 +74,7 @@ impl<const D: usize> WithSimd for Chunk<'_, D> {
             // rows are padded: a bond that leaves the storage is never intact
             if there < self.pull.sites && there + TILE <= self.pull.sites {
                 for part in (0..TILE).step_by(VECTORS * S::F64_LANES) {
-                    self.pull.some::<S>(simd, start, there, part, &mut forces);
+                    self.pull.tile_forces::<S>(simd, start, there, part, &mut forces);
                 }
             }
             for i in 0..TILE {
@@ -86,7 +86,8 @@ impl<const D: usize> WithSimd for Chunk<'_, D> {
     }
 }
 
-/// Vectors from a number on. A function of arrays in place of the loop would not become part of code for vectors.
+/// Loads vectors from a number on. A function of arrays instead of the loop would not be inlined into vector
+/// code.
 #[inline(always)]
 fn vectors<S: Simd>(simd: S, numbers: &[f64], from: usize) -> [S::f64s; VECTORS] {
     let vectors = &S::as_simd_f64s(&numbers[from..from + VECTORS * S::F64_LANES]).0[..VECTORS];
@@ -99,9 +100,16 @@ fn vectors<S: Simd>(simd: S, numbers: &[f64], from: usize) -> [S::f64s; VECTORS]
 }
 
 impl<const D: usize> Pull<'_, D> {
-    /// Some vectors of a tile, from its site `part` on.
+    /// Computes some vectors of a tile, from its site `part` on.
     #[inline(always)]
-    fn some<S: Simd>(&self, simd: S, start: usize, there: usize, part: usize, forces: &mut [[f64; TILE]; D]) {
+    fn tile_forces<S: Simd>(
+        &self,
+        simd: S,
+        start: usize,
+        there: usize,
+        part: usize,
+        forces: &mut [[f64; TILE]; D],
+    ) {
         let zero = simd.splat_f64s(0.0);
         let (mut e, mut zeta) = ([zero; VECTORS], [[zero; VECTORS]; D]);
         for d in 0..D {
@@ -141,7 +149,7 @@ impl<const D: usize> Pull<'_, D> {
         let words = &self.weights.words[start + part..][..VECTORS * S::F64_LANES];
         let (words, bit) = (&S::as_simd_u64s(words).0[..VECTORS], simd.splat_u64s(self.weights.bit));
         for v in 0..VECTORS {
-            // what lies where there is no particle may be anything
+            // values without a particle are arbitrary
             let intact = simd.equal_u64s(simd.and_u64s(words[v], bit), bit);
             q[v] = simd.select_f64s(intact, q[v], zero);
         }

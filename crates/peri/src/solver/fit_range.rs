@@ -1,4 +1,4 @@
-//! The stretches that a law is evaluated over, and how they follow those that are observed.
+//! Range of stretches of a fitted law, and its extension to observed stretches.
 
 use super::criterion::{least, most};
 use super::state::State;
@@ -9,27 +9,29 @@ use crate::material::LawCover;
 use crate::potential::StretchRange;
 
 impl<const D: usize> System<'_, D> {
-    /// Brings bonds, law and loads to where a state is: at rest, or where an interrupted run was.
+    /// Restores bonds, law and loads of a state: at rest, or of an interrupted run.
     ///
     /// # Errors
-    /// [`Error::Geometry`] where the state belongs to another body, or as [`crate::potential::KernelFit::new`].
+    /// [`Error::Geometry`] if the state belongs to another body, and errors of
+    /// [`crate::potential::KernelFit::new`].
     pub fn restore(&mut self, state: &mut State<D>) -> Result<(), Error> {
         state.fracture.restore(&mut *self.bonds)?;
         if state.fracture.intact.is_some() {
             let particles = self.bonds.particles().to_vec();
-            self.release(particles.iter().copied());
+            self.unload_detached(particles.iter().copied());
         }
         if !state.control.factors.is_empty() {
             self.factors.to_mut().clone_from(&state.control.factors);
         }
         self.rebuild_contact(&state.displacement);
         state.stretches.fitted[1] = state.stretches.fitted[1].min(most(self.breaking.as_ref()));
-        // a bound that depends on the displacement stays that of the run before
+        // a bound that depends on the displacement stays that of the previous run
         let known = Some(state.stretches.tangent).filter(|&tangent| tangent > 0.0);
-        self.fit(state, known)
+        self.fit_law(state, known)
     }
 
-    /// Whether every stretch of the state, `observed` if that is known, lies within the fit; widens it otherwise.
+    /// Returns true if every stretch of the state, `observed` if known, lies within the fit; widens the fit
+    /// otherwise.
     pub(super) fn covers_stretches(
         &mut self,
         state: &mut State<D>,
@@ -37,20 +39,20 @@ impl<const D: usize> System<'_, D> {
     ) -> Result<bool, Error> {
         let observed = observed.unwrap_or_else(|| stretch_range(&*self.bonds, &state.displacement));
         state.stretches.balanced = observed;
-        state.stretches.see(observed);
+        state.stretches.observe(observed);
         Ok(!self.widen(state)?)
     }
 
-    /// Widens the fitted range where stretches have left it, and the tangent with it.
+    /// Widens the fitted range, and the tangent with it, if stretches have left it.
     pub(super) fn widen(&mut self, state: &mut State<D>) -> Result<bool, Error> {
         if !state.stretches.widen([least, most].map(|of| of(self.breaking.as_ref()))) {
             return Ok(false);
         }
-        self.fit(state, None)?;
+        self.fit_law(state, None)?;
         Ok(true)
     }
 
-    /// The part of stretches that the law itself covers; beyond it q is constant, and energies grow with e.
+    /// Part of a stretch range that the law itself covers; beyond it q is constant, and energies grow with e.
     pub fn fitted_part(&self, observed: StretchRange) -> StretchRange {
         if self.breaking.is_none() {
             return observed;
@@ -62,7 +64,7 @@ impl<const D: usize> System<'_, D> {
         }
     }
 
-    pub(super) fn fit(&mut self, state: &mut State<D>, known: Option<f64>) -> Result<(), Error> {
+    pub(super) fn fit_law(&mut self, state: &mut State<D>, known: Option<f64>) -> Result<(), Error> {
         let (bound, clamped) = (self.fit_bound, self.breaking.is_some());
         let cover = LawCover { stretches: state.stretches.fitted, bound, clamped, known };
         state.stretches.tangent = self.material.cover(&mut *self.bonds, &state.displacement, &cover)?;

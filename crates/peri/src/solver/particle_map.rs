@@ -1,7 +1,8 @@
-//! Fields over particles alone: storage sites without a particle, which a lattice has many of, take no part in sums and products.
+//! Fields over particles only: storage sites without a particle, of which a lattice has many, take no part in
+//! sums and products.
 //!
-//! Particle k of such a field is that of site `particles()[k]`: work item after work item of the storage, so that each of them has its
-//! own part.
+//! Particle k of such a field is that of site `particles()[k]`: work item after work item of the storage, so
+//! that each item has its own part.
 
 use super::load::Loads;
 use crate::bonds::BodyGeometry;
@@ -10,7 +11,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Particles in consecutive sites of one work item.
-struct Run {
+struct SiteRun {
     /// First site, in its work item.
     site: usize,
     /// First particle, in its work item.
@@ -18,19 +19,19 @@ struct Run {
     length: usize,
 }
 
-/// Where particles are.
+/// Positions of particles in storage.
 #[derive(Default)]
-pub struct Places {
-    runs: Vec<Run>,
+pub struct ParticleMap {
+    runs: Vec<SiteRun>,
     /// The runs of each work item, its first particle, and the number of particles at the end.
     items: Vec<Range<usize>>,
     first: Vec<usize>,
-    /// Constrained particles, and which components of them.
+    /// Constrained particles with the bits of their components.
     held: Vec<(usize, u8)>,
 }
 
-impl Places {
-    /// Of a body and its loads.
+impl ParticleMap {
+    /// Maps the particles of a body and its loads.
     pub fn new<const D: usize>(bonds: &dyn BodyGeometry<D>, loads: &Loads<D>) -> Self {
         let mut places = Self { first: vec![0], ..Self::default() };
         let particles = bonds.particles();
@@ -41,7 +42,7 @@ impl Places {
                 let (site, particle) = (particles[next] as usize % CHUNK, next - first);
                 match places.runs[begin..].last_mut() {
                     Some(run) if run.site + run.length == site => run.length += 1,
-                    _ => places.runs.push(Run { site, particle, length: 1 }),
+                    _ => places.runs.push(SiteRun { site, particle, length: 1 }),
                 }
                 next += 1;
             }
@@ -53,8 +54,8 @@ impl Places {
         places
     }
 
-    /// Constrained particles, and which components of them, of all particles or of some.
-    pub fn held(&self, particles: Range<usize>) -> &[(usize, u8)] {
+    /// Constrained particles of a range, with the bits of their components.
+    pub fn constrained(&self, particles: Range<usize>) -> &[(usize, u8)] {
         let place = |particle: usize| self.held.partition_point(|held| held.0 < particle);
         &self.held[place(particles.start)..place(particles.end)]
     }
@@ -64,7 +65,7 @@ impl Places {
         self.first[item]..self.first[item + 1]
     }
 
-    /// A field over particles, cut where the work items of the storage are.
+    /// Splits a field over particles at the work items of the storage.
     pub fn parts_mut<'a, const D: usize>(&self, field: &'a mut Field<D>) -> Vec<[&'a mut [f64]; D]> {
         let mut rest = field.components_mut();
         let cut = |item: usize| {
@@ -78,7 +79,7 @@ impl Places {
         (0..self.items.len()).map(cut).collect()
     }
 
-    /// Takes the particles of a work item out of its sites, in one component.
+    /// Gathers the particles of a work item from its sites, in one component.
     pub fn gather(&self, item: usize, sites: &[f64], particles: &mut [f64]) {
         for run in &self.runs[self.items[item].clone()] {
             let of_run = run.particle..run.particle + run.length;
@@ -111,10 +112,10 @@ impl Places {
     }
 }
 
-/// Work items of vector operations from which on it pays to wake other threads.
+/// Number of work items of vector operations above which other threads are used.
 pub const FEW: usize = 8;
 
-/// What `work` makes of all items, in their order.
+/// Collects the results of `work` for all items, in their order.
 pub fn in_order<T: Send, R: Send>(items: Vec<T>, work: impl Fn(usize, T) -> R + Sync + Send) -> Vec<R> {
     if items.len() < FEW {
         items.into_iter().enumerate().map(|(index, item)| work(index, item)).collect()

@@ -1,12 +1,14 @@
-//! Loads without an equilibrium: parts of a body that bear a force and that nothing holds, and displacements far beyond the body.
+//! Loads without an equilibrium: parts of a body with a force and no support, and displacements far beyond
+//! the body.
 //!
-//! Intact bonds divide a body into parts. Supports prescribe single components, so that a part of which component d is nowhere prescribed
-//! bears no reaction along d: where its forces along d do not vanish it has no equilibrium at any displacement. Where every such sum
-//! vanishes, forces that do not follow the body leave its rotation a potential that is bounded, so that no other mechanism lacks an
-//! equilibrium: only translations are looked at. Contact pushes: a plane may hold what presses on it, a part held along d what lies behind it.
+//! Intact bonds divide a body into parts. Supports prescribe single components; a part of which component d
+//! is nowhere prescribed has no reaction along d, so if its forces along d do not vanish it has no
+//! equilibrium at any displacement. If every such sum vanishes, dead loads give its rotation a bounded
+//! potential, so that no other mechanism lacks an equilibrium: only translations are checked. Contact pushes:
+//! a plane may hold a part that presses on it, a part held along d may hold one behind it.
 
+use super::force_scale::ForceScale;
 use super::load::Loads;
-use super::scale::Scale;
 use super::state::State;
 use super::system::System;
 use crate::bonds::{BodyGeometry, components};
@@ -15,32 +17,34 @@ use crate::field::Field;
 use std::collections::BTreeMap;
 use std::fmt;
 
-/// Displacement over the size of the body, or over the largest prescribed one, beyond which it is no equilibrium's.
-const FAR: f64 = 1e3;
+/// Displacement over the size of the body, or over the largest prescribed one, beyond which it is not an
+/// equilibrium.
+const FARTHEST: f64 = 1e3;
 
-/// A part of a body, held together by intact bonds, whose forces along an axis nothing balances.
+/// A part of a body, connected by intact bonds, whose forces along an axis nothing balances.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Adrift {
-    /// Its particles.
+pub struct Unsupported {
+    /// Number of particles.
     pub particles: usize,
-    /// Particles of the body.
-    pub of: usize,
-    /// Its middle in the reference configuration, m.
+    /// Number of particles of the body.
+    pub total: usize,
+    /// Middle of the part in the reference configuration, m.
     pub middle: Vec<f64>,
-    /// The axis.
+    /// Axis of the force.
     pub axis: &'static str,
-    /// Sum of its forces along the axis at load factor 1, N.
+    /// Sum of the part's forces along the axis at load factor 1, N.
     pub force: f64,
 }
 
-impl fmt::Display for Adrift {
+impl fmt::Display for Unsupported {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let middle: Vec<String> = self.middle.iter().map(|x| format!("{:.4}", x * 1e3)).collect();
         write!(
             f,
-            "a part of {} of {} particles around X = ({}) mm bears {:.3e} N along {} at load factor 1, and nothing holds it along {}",
+            "a part of {} of {} particles around X = ({}) mm bears {:.3e} N along {} at load factor 1, \
+            and nothing holds it along {}",
             self.particles,
-            self.of,
+            self.total,
             middle.join(", "),
             self.force,
             self.axis,
@@ -49,20 +53,20 @@ impl fmt::Display for Adrift {
     }
 }
 
-/// What may hold a part beside supports: it pushes.
+/// Contacts that may hold a part besides supports, by pushing.
 #[derive(Clone, Debug, Default)]
-pub struct Stops<const D: usize> {
+pub struct ContactStops<const D: usize> {
     /// Normals of rigid planes, towards the body.
     pub normals: Vec<[f64; D]>,
-    /// Whether particles repel each other.
+    /// True if particles repel each other.
     pub pairs: bool,
-    /// Whether anything rubs: it may then hold along every axis.
+    /// True with friction, which may hold along every axis.
     pub rubs: bool,
 }
 
-/// What is known of a part.
+/// Forces and extent of a part.
 #[derive(Clone, Copy)]
-struct Piece<const D: usize> {
+struct PartLoads<const D: usize> {
     particles: usize,
     /// Components prescribed in any particle.
     held: u8,
@@ -75,22 +79,23 @@ struct Piece<const D: usize> {
     extent: [[f64; 2]; D],
 }
 
-/// The first part of a body with forces along an axis that add up to more than `tolerance` of their sizes, and that nothing can hold.
-pub fn adrift<const D: usize>(
+/// Finds the first part of a body whose forces along an axis sum to more than `tolerance` of their sizes and
+/// which nothing can hold.
+pub fn find_unsupported<const D: usize>(
     bonds: &dyn BodyGeometry<D>,
     loads: &Loads<D>,
     displacement: Option<&Field<D>>,
-    stops: &Stops<D>,
+    stops: &ContactStops<D>,
     tolerance: f64,
-) -> Option<Adrift> {
+) -> Option<Unsupported> {
     let body = loads.body_force.as_ref()?;
     let roots = components(bonds, |_, _| true);
-    let mut pieces: BTreeMap<u32, Piece<D>> = BTreeMap::new();
+    let mut pieces: BTreeMap<u32, PartLoads<D>> = BTreeMap::new();
     for &site in bonds.particles() {
         let (site, root) = (site as usize, roots[site as usize]);
         let (volume, force, rest) = (bonds.volume(site), body.get(site), bonds.position(site));
         let moved = displacement.map_or([0.0; D], |field| field.get(site));
-        let piece = pieces.entry(root).or_insert(Piece {
+        let piece = pieces.entry(root).or_insert(PartLoads {
             particles: 0,
             held: 0,
             force: [0.0; D],
@@ -110,10 +115,10 @@ pub fn adrift<const D: usize>(
             piece.extent[d] = [piece.extent[d][0].min(place), piece.extent[d][1].max(place)];
         }
     }
-    let holds = |piece: &Piece<D>, d: usize| {
+    let holds = |piece: &PartLoads<D>, d: usize| {
         let sign = piece.force[d].signum();
         let middle = piece.middle[d] / piece.particles as f64;
-        let ahead = |other: &Piece<D>| {
+        let ahead = |other: &PartLoads<D>| {
             let end = if sign > 0.0 { other.extent[d][1] } else { -other.extent[d][0] };
             other.held >> d & 1 == 1 && end > sign * middle
         };
@@ -125,9 +130,9 @@ pub fn adrift<const D: usize>(
     for piece in pieces.values() {
         for d in 0..D {
             if piece.force[d].abs() > tolerance * piece.size[d] && !holds(piece, d) {
-                return Some(Adrift {
+                return Some(Unsupported {
                     particles: piece.particles,
-                    of: bonds.particles().len(),
+                    total: bonds.particles().len(),
                     middle: piece.reference.map(|x| x / piece.particles as f64).to_vec(),
                     axis: ["x", "y", "z"][d],
                     force: piece.force[d],
@@ -139,17 +144,21 @@ pub fn adrift<const D: usize>(
 }
 
 impl<const D: usize> System<'_, D> {
-    fn stops(&self) -> Stops<D> {
-        let Some(contact) = self.repulsion() else { return Stops::default() };
+    fn stops(&self) -> ContactStops<D> {
+        let Some(contact) = self.repulsion() else { return ContactStops::default() };
         let normals = contact.planes().map(|plane| plane.normal).collect();
-        Stops { normals, pairs: contact.has_pairs(), rubs: contact.rubs() || contact.is_tied() }
+        ContactStops {
+            normals,
+            pairs: contact.has_pairs(),
+            rubs: contact.has_friction() || contact.is_tied(),
+        }
     }
 
-    /// Refuses parts that bear a force and that nothing holds; of a body with given forces only.
+    /// Refuses parts with a force and no support, in a body with dead loads only.
     ///
     /// # Errors
-    /// [`Error::NoEquilibrium`].
-    pub(super) fn refuse_adrift(&self, state: &State<D>, tolerance: f64) -> Result<(), Error> {
+    /// [`Error::NoEquilibrium`] for such a part.
+    pub(super) fn refuse_unsupported(&self, state: &State<D>, tolerance: f64) -> Result<(), Error> {
         if self.loads.body_force.is_none() || self.factors.is_empty() {
             return Ok(());
         }
@@ -162,7 +171,8 @@ impl<const D: usize> System<'_, D> {
                 "every particle that bore a force has lost all its bonds".to_owned(),
             ));
         }
-        match adrift(&*self.bonds, &self.loads, Some(&state.displacement), &self.stops(), tolerance) {
+        match find_unsupported(&*self.bonds, &self.loads, Some(&state.displacement), &self.stops(), tolerance)
+        {
             Some(part) => Err(self.no_equilibrium(state, part.to_string())),
             None => Ok(()),
         }
@@ -171,14 +181,14 @@ impl<const D: usize> System<'_, D> {
     /// Refuses a balance of forces at a displacement that only rounding can balance.
     ///
     /// # Errors
-    /// [`Error::NoEquilibrium`].
+    /// [`Error::NoEquilibrium`] beyond it.
     pub(super) fn refuse_far(&self, state: &State<D>) -> Result<(), Error> {
         if self.loads.body_force.is_none() {
             return Ok(());
         }
         let factor = self.factors.get(state.step).copied().unwrap_or(1.0);
-        let Scale { largest, diagonal, .. } = self.scale;
-        let limit = FAR * diagonal.max(largest * factor.abs());
+        let ForceScale { largest, diagonal, .. } = self.scale;
+        let limit = FARTHEST * diagonal.max(largest * factor.abs());
         let sites = self.bonds.particles().iter().map(|&site| state.displacement.get(site as usize));
         let square = sites.map(|u| u.iter().map(|x| x * x).sum::<f64>()).fold(0.0, f64::max);
         let far = square.sqrt();

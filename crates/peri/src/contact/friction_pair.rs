@@ -1,16 +1,17 @@
-//! Coulomb friction with elastic slip: return mapping of Simo & Laursen (1992), doi:10.1016/0045-7949(92)90540-G.
+//! Coulomb friction with elastic slip: return mapping of Simo & Laursen (1992),
+//! doi:10.1016/0045-7949(92)90540-G.
 //!
-//! Two sides in touch hold each other by T = −k_t e with the elastic slip e, up to |T| = b = μN; what goes beyond slides. For a given N
-//! the force is the gradient of the convex potential ½k_t|e*|² below b/k_t and b|e*| − b²/(2k_t) beyond, e* = Pe + Δu_t: equilibria
-//! exist, and methods that seek a minimum find them.
+//! Two sides in contact hold each other by T = −k_t e with the elastic slip e, up to |T| = b = μN; the rest
+//! slides. For a given N the force is the gradient of the convex potential ½k_t|e*|² below b/k_t and b|e*| −
+//! b²/(2k_t) beyond, e* = Pe + Δu_t: equilibria exist, and minimisers find them.
 
 use crate::geometry::length;
 use serde::{Deserialize, Serialize};
 
-/// Two sides in touch.
+/// Two sides in contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub enum Pair {
-    /// A particle and another one, by their sites.
+pub enum ContactPair {
+    /// Two particles, by their sites.
     Particles(u32, u32),
     /// A plane and a face, by their numbers.
     Face(u32, u32),
@@ -20,9 +21,9 @@ pub enum Pair {
 
 /// Friction of a pair.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Grip {
+pub struct FrictionPair {
     /// The sides.
-    pub pair: Pair,
+    pub pair: ContactPair,
     /// Elastic slip e, m.
     pub slip: [f64; 3],
     /// b = μN, N.
@@ -31,7 +32,7 @@ pub struct Grip {
     pub stiffness: f64,
     /// Unit normal, towards the first side of two particles and the body of a plane.
     pub normal: [f64; 3],
-    /// Part of a load step since the sides have touched.
+    /// Fraction of the load step since the sides have touched.
     pub share: f64,
 }
 
@@ -46,13 +47,13 @@ pub struct Drag {
     pub dissipated: f64,
 }
 
-impl Grip {
+impl FrictionPair {
     /// Energy of the elastic slip, J.
     pub fn energy(&self) -> f64 {
         0.5 * self.stiffness * length(self.slip).powi(2)
     }
 
-    /// Friction where the first side has moved by `moved`, m, against the second.
+    /// Computes the friction after the first side has moved by `moved`, m, against the second.
     pub fn drag(&self, moved: [f64; 3]) -> Drag {
         let moved = across(&self.normal, moved);
         let trial: [f64; 3] = std::array::from_fn(|d| self.slip[d] + self.share * moved[d]);
@@ -68,8 +69,8 @@ impl Grip {
         }
     }
 
-    /// Turns the slip into the plane across a new normal at its length, and shortens it to what the bound holds.
-    pub fn fit(&mut self) {
+    /// Rotates the slip into the plane across a new normal, keeping its length, and shortens it to the bound.
+    pub fn project(&mut self) {
         let old = length(self.slip);
         let turned = across(&self.normal, self.slip);
         let size = length(turned);
@@ -78,7 +79,7 @@ impl Grip {
     }
 }
 
-/// The part of a vector across a unit normal.
+/// Projects a vector onto the plane across a unit normal.
 pub fn across<const D: usize>(normal: &[f64; D], vector: [f64; D]) -> [f64; D] {
     let along: f64 = normal.iter().zip(vector).map(|(n, v)| n * v).sum();
     std::array::from_fn(|d| vector[d] - along * normal[d])
