@@ -38,7 +38,7 @@ fn energy(law: Affine, gradient: [[f64; 3]; 3]) -> f64 {
     law.energy(&family, &material.points()[middle])
 }
 
-/// At small strains the bulk modulus is K, and Voigt's mean of both shear moduli of the lattice is μ: it
+/// The bulk modulus at small strains is K, and Voigt's mean of both shear moduli of the lattice is μ: it
 /// depends on Σŵ(n·n)² = 1 only.
 #[test]
 fn small_strains_have_both_moduli() {

@@ -59,7 +59,7 @@ fn in_mixed_precision<const D: usize>(
     }
 }
 
-/// Both paths agree with each other and with a plain loop, for every law on one body.
+/// Forces of both paths agree with each other and with a plain loop, for every law on one body.
 fn compare<const D: usize>(body: &Body<D>, size: f64, name: &str) {
     let mut built = body.build();
     let mut copied = body.build().cloud;

@@ -282,8 +282,10 @@ space = "solid"
 spacing = "1 mm"
 shapes = [{ add = "box", min = ["-6 mm", "-6 mm", "-9 mm"], max = ["6 mm", "6 mm", "9 mm"] }]
 cracks = [
- { from = ["-7 mm", "-7 mm", "0.13 mm"], to = ["0.5 mm", "-7 mm", "0.71 mm"], and = ["-7 mm", "7 mm", "0.13 mm"] },
- { from = ["0.5 mm", "-7 mm", "0.71 mm"], to = ["7 mm", "-7 mm", "0.29 mm"], and = ["0.5 mm", "7 mm", "CORNER mm"] },
+ { from = ["-7 mm", "-7 mm", "0.13 mm"], to = ["0.5 mm", "-7 mm", "0.71 mm"], and = [
+  "-7 mm", "7 mm", "0.13 mm"] },
+ { from = ["0.5 mm", "-7 mm", "0.71 mm"], to = ["7 mm", "-7 mm", "0.29 mm"], and = [
+  "0.5 mm", "7 mm", "CORNER mm"] },
 ]
 [material]
 youngs_modulus = "2 MPa"

@@ -32,7 +32,8 @@ program = "peri"
 [body]
 space = "solid"
 spacing = "1 mm"
-shapes = [{{ add = "cylinder", centre = ["0 mm", "0 mm", "0 mm"], radius = "5 mm", length = "32 mm", axis = "z" }}]
+shapes = [{{ add = "cylinder", centre = [
+ "0 mm", "0 mm", "0 mm"], radius = "5 mm", length = "32 mm", axis = "z" }}]
 [material.solid]
 law = "eight-chain"
 shear_modulus = "0.4 MPa"
