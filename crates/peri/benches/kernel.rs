@@ -45,7 +45,11 @@ pub fn loaded<const D: usize>(
     Ok((fit, displacement))
 }
 
-/// A material ready for solvers, and its name.
+/// Response of a material, and its name.
+pub type Named<const D: usize> = (&'static str, Box<dyn Response<D>>);
+
+=======
+/// Response of a material, and its name.
 pub type Named<const D: usize> = (&'static str, Box<dyn SolverMaterial<D>>);
 
 /// Returns solids with two passes: chains of 25 links, and by correspondence neo-Hookean rubber, K/μ = 100,

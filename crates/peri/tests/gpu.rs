@@ -26,7 +26,10 @@ fn devices() -> Vec<Device> {
     if found.is_empty() {
         evidence::skipped(
             "a device behind Vulkan, Metal or DirectX 12 (a program that stands for one: \
-            mesa-vulkan-drivers)",
+             mesa-vulkan-drivers)",
+>>=======
+             mesa-vulkan-drivers)",
+>>>>>>> theirs
         );
     }
     found

@@ -13,7 +13,7 @@ pub struct BreakingEvent {
     pub bonds: u64,
     /// Hash of the bonds: two sets of bonds of one body have different ones.
     pub fingerprint: u64,
-    /// Load of the equilibrium before, N, see [`StepRecord::load`](super::Record::load); 0 in dynamics.
+    /// Load of the equilibrium before, N, see [`StepRecord::load`](super::StepRecord::load); 0 in dynamics.
     pub load: f64,
 }
 

@@ -48,7 +48,7 @@ pub struct System<'a, const D: usize> {
     pub(super) scale: ForceScale,
     /// Load factor and its rate over the time, s, in explicit dynamics, instead of the ramp.
     pub course: Option<&'a LoadCurve<'a>>,
-    /// Values recorded in every row of the history, see [`StepRecord::seen`](super::Record::seen).
+    /// Values recorded in every row of the history, see [`StepRecord::seen`](super::StepRecord::seen).
     pub observer: Option<&'a StateObserver<'a, D>>,
 }
 

@@ -1,5 +1,6 @@
-//! Solids of the mean deformation in irregular clouds: kernels against plain loops, patch test, order
-//! of
+//! Solids of the mean deformation in irregular clouds: kernels against plain loops, patch test, order of
+=======
+//! Solids of the mean deformation in irregular clouds: kernels against plain loops, patch test, order of
 //! convergence, a hole.
 
 use crate::bodies::{Random, hold};
@@ -277,8 +278,9 @@ fn jittered_clouds_pass_the_patch_test() {
     }
 }
 
-/// Forces are slopes of the energy to 1e-9: intact, with 30 % of the bonds broken, and with some
-/// particles on
+/// Forces are slopes of the energy to 1e-9: intact, with 30 % of the bonds broken, and with some particles on
+=======
+/// Forces are slopes of the energy to 1e-9: intact, with 30 % of the bonds broken, and with some particles on
 /// springs.
 fn slopes<const D: usize>(space: Space, side: usize, ratio: f64) {
     let mut bonds = Scattered { ratio, uneven: 0.2, ..Scattered::new(side, 0.2) }.build::<D>(true);
@@ -471,8 +473,9 @@ fn ring_error(n: usize, relieved: bool) -> f64 {
     (sum / f64::from(count)).sqrt()
 }
 
-/// Kirsch's displacement and stress (xx, yy, xy) around a free hole of radius 1 under unit tension along x,
-/// μ
+/// Kirsch's displacement and stress (xx, yy, xy) around a free hole of radius 1 under unit tension along x, μ
+=======
+/// Kirsch's displacement and stress (xx, yy, xy) around a free hole of radius 1 under unit tension along x, μ
 /// = 1, K = 5/3.
 fn kirsch([x, y]: [f64; 2]) -> ([f64; 2], [f64; 3]) {
     let (poisson, t) = (0.25, y.atan2(x));

@@ -73,6 +73,8 @@ fn two_particles() {
 }
 
 /// At coincident positions (r = 0) the force is κcd/δ along the reference bond, at any displacement; the
+=======
+/// The force at coincident positions (r = 0) is κcd/δ along the reference bond, at any displacement; the
 /// other limits are 0.
 #[test]
 fn degenerate_states() {

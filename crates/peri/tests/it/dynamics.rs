@@ -193,7 +193,10 @@ fn energies_balance() {
         let worst = state.history.iter().map(|r| error(r).abs()).fold(0.0, f64::max) / scale;
         eprintln!(
             "step {part} of critical, damping {damping}, {} broken: work {:.3e}, kinetic {:.3e}, stored \
-            {:.3e}, \
+             {:.3e}, \
+>>=======
+             {:.3e}, \
+>>>>>>> theirs
              released {:.3e}, damped {:.3e} J; off by {worst:.1e}",
             last.broken, last.work, last.kinetic, last.stored, last.released, last.damped
         );
@@ -373,7 +376,10 @@ fn rigid_rotation() {
         state.history.iter().map(|r| ((r.kinetic + r.stored) / r.work - 1.0).abs()).fold(0.0, f64::max);
     eprintln!(
         "one free turn in {} steps: momentum {moved:.1e}, spin {turned:.1e}, energy {energy:.1e}, stretch \
-        {:.5}",
+         {:.5}",
+>>=======
+         {:.5}",
+>>>>>>> theirs
         state.counts.total_iterations,
         state.history.last().unwrap().largest_stretch
     );

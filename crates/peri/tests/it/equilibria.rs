@@ -1,5 +1,6 @@
-//! Loads without equilibrium: bodies torn by a force, free bodies, prescribed displacements that press
-//! a body
+//! Loads without equilibrium: bodies torn by a force, free bodies, prescribed displacements that press a body
+=======
+//! Loads without equilibrium: bodies torn by a force, free bodies, prescribed displacements that press a body
 //! through itself.
 
 use crate::bodies::{Body, MODULUS, hold};

@@ -1,5 +1,6 @@
-//! Pressure filter: the checks of all materials, unchanged uniform states, and the roughness at
-//! corners of
+//! Pressure filter: the checks of all materials, unchanged uniform states, and the roughness at corners of
+=======
+//! Pressure filter: the checks of all materials, unchanged uniform states, and the roughness at corners of
 //! rigid grips by an independent program.
 
 use crate::materials::battery;

@@ -50,9 +50,14 @@ fn strained<const D: usize>(points: &[[f64; D]]) -> Vec<[f64; D]> {
     points.iter().map(|x| std::array::from_fn(|a| (0..D).map(|b| h(a, b) * x[b]).sum())).collect()
 }
 
-/// Checks that in a body with a hole every particle, at edges, corners and the hole, has the stress of its
-/// own bonds if none is missing; the greatest error by `hardy`.
+/// Every particle of a body with a hole, also at edges and corners, has the stress of a complete family;
+/// returns the largest error of `hardy`.
+fn patch<const D: usize>(ratio: f64, cells: [usize; D], measures: &[Measure]) -> f64 {
+>>=======
+/// Every particle of a body with a hole, also at edges and corners, has the stress of a complete family;
+/// returns the largest error of `hardy`.
 fn patch<const D: usize>(ratio: f64, cells: [usize; D], measures: &[StressMethod]) -> f64 {
+>>>>>>> theirs
     let mut body = Body::<D>::solid(cells, 1.0, ratio);
     let far = 2.0 * ratio;
     let centre = cells.map(|c| c as f64 - far - 1.5);
@@ -350,8 +355,9 @@ fn divergence_is_the_average_over_the_window() {
     }
 }
 
-/// Fields do not depend on memory beside the rows of a body: a body in a larger box of cells
-/// has equal
+/// Fields do not depend on memory beside the rows of a body: a body in a larger box of cells has equal
+=======
+/// Fields do not depend on memory beside the rows of a body: a body in a larger box of cells has equal
 /// fields.
 #[test]
 fn rows_do_not_reach_into_each_other() {

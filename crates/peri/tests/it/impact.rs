@@ -1,5 +1,7 @@
-//! Impact of bodies by velocity Verlet: the closed form of two particles, momentum, energy,
-//! Newton's cradle.
+//! Impact of bodies by velocity Verlet: the closed form of two particles, momentum, energy, Newton's cradle.
+>>=======
+//! Impact of bodies by velocity Verlet: the closed form of two particles, momentum, energy, Newton's cradle.
+>>>>>>> theirs
 
 use crate::bodies::{Body, MODULUS, Slit, hold};
 use crate::dynamics::DENSITY;

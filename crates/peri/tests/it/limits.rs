@@ -229,7 +229,7 @@ fn loose_parts_stay_where_they_are_put() {
     }
 }
 
-/// One problem in nanometres and kilometres, pascals and terapascals has equal u/L and iterations.
+/// A problem in nanometres and kilometres, pascals and terapascals has equal u/L and iterations.
 #[test]
 fn results_scale_with_length_and_modulus() {
     fn solve<const D: usize>(cells: [usize; D], length: f64, stiffness: f64) -> (Vec<[f64; D]>, u64) {

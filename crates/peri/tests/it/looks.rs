@@ -37,8 +37,10 @@ pictures = false
 fields = false
 "#;
 
-/// A body rotated by θ = 0.3 about the origin has a rotation of 0.3, no strains and
-/// no forces.
+/// A body rotated by θ = 0.3 about the origin has a rotation of 0.3, no strains and no forces.
+>>=======
+/// A body rotated by θ = 0.3 about the origin has a rotation of 0.3, no strains and no forces.
+>>>>>>> theirs
 #[test]
 fn a_rotation_is_seen_as_one() {
     let directory = tempfile::tempdir().unwrap();
@@ -61,8 +63,10 @@ displacement_field = [\"(cos(0.3) - 1)*x - sin(0.3)*y\", \"sin(0.3)*x + (cos(0.3
     assert!(table.lines().next().unwrap().contains("turn [rad],gauge,end [m]"), "{table}");
 }
 
-/// A homogeneous strain prescribed at the rim reaches the inside (Cauchy–Born), and
-/// marks measure it.
+/// A homogeneous strain prescribed at the rim reaches the inside (Cauchy–Born), and marks measure it.
+>>=======
+/// A homogeneous strain prescribed at the rim reaches the inside (Cauchy–Born), and marks measure it.
+>>>>>>> theirs
 #[test]
 fn a_strain_between_marks() {
     let directory = tempfile::tempdir().unwrap();
@@ -79,8 +83,9 @@ displacement_field = [\"0.02*x\", \"-0.01*y\"]\n",
             min[0], min[1], max[0], max[1]
         );
     }
-    scene += "[solver]\ntolerance = 1e-10\n[[probe]]\nname = \"along\"\ntrack = \"strain\"\n\
-    from = [\"31 \
+    scene += "[solver]\ntolerance = 1e-10\n[[probe]]\nname = \"along\"\ntrack = \"strain\"\nfrom = [\"31 \
+=======
+    scene += "[solver]\ntolerance = 1e-10\n[[probe]]\nname = \"along\"\ntrack = \"strain\"\nfrom = [\"31 \
         mm\", \"1 mm\"]\nto = [\"51 mm\", \"1 mm\"]
 [[probe]]\nname = \"across\"\ntrack = \"strain\"\nfrom = [\"41 mm\", \"-5 mm\"]\n\
         to = [\"41 mm\", \"5 \
@@ -96,10 +101,12 @@ fn loads_follow_a_factor() {
     let directory = tempfile::tempdir().unwrap();
     let scene = format!(
         "{SHEET}\n[[boundary]]\nname = \"all\"\nmin = [\"0 mm\", \"-20 mm\"]\nmax = [\"80 mm\", \"20 \
-         mm\"]\n\
-        displacement = [\"2 mm\", \"0 mm\"]
-[solver]\nmethod = \"verlet\"\n[dynamics]\ndensity = \"1 g/cm^3\"\nend_time = \"3 ms\"\nrecords = 3\n\
-        factor \
+         mm\"]\ndisplacement = [\"2 mm\", \"0 mm\"]
+[solver]\nmethod = \"verlet\"\n[dynamics]\ndensity = \"1 g/cm^3\"\nend_time = \"3 ms\"\nrecords = 3\nfactor \
+=======
+        "{SHEET}\n[[boundary]]\nname = \"all\"\nmin = [\"0 mm\", \"-20 mm\"]\nmax = [\"80 mm\", \"20 \
+         mm\"]\ndisplacement = [\"2 mm\", \"0 mm\"]
+[solver]\nmethod = \"verlet\"\n[dynamics]\ndensity = \"1 g/cm^3\"\nend_time = \"3 ms\"\nrecords = 3\nfactor \
 = \"sin(pi*t/4e-3)\"
 [[probe]]\nname = \"all\"\ntrack = \"displacement\"\naxis = \"x\"\n"
     );
@@ -125,7 +132,10 @@ fn a_grid_is_a_box() {
         let to = SHEET.find("[material]").unwrap();
         format!(
             "{}horizon = \"6.03 mm\"\ngrid = {{ min = [\"0 mm\", \"-20 mm\"], max = [\"80 mm\", \"20 mm\"], \
-            cells = {cells} }}\n{}{ends}",
+             cells = {cells} }}\n{}{ends}",
+>>=======
+             cells = {cells} }}\n{}{ends}",
+>>>>>>> theirs
             &SHEET[..from],
             &SHEET[to..]
         )
@@ -203,8 +213,9 @@ fn what_is_most_likely_not_meant() {
         (0..200).map(|k| format!("{}e-3,{}e-3,4e-6\n", 2 * (k % 20), 2 * (k / 20))).collect();
     std::fs::write(directory.path().join("points.csv"), format!("x,y,volume\n{points}")).unwrap();
     let cloud = format!(
-        "version = 1\nprogram = \"peri\"\n[body]\nspace = \"plane-stress\"\nthickness = \"1 mm\"\n\
-        horizon = \
+        "version = 1\nprogram = \"peri\"\n[body]\nspace = \"plane-stress\"\nthickness = \"1 mm\"\nhorizon = \
+=======
+        "version = 1\nprogram = \"peri\"\n[body]\nspace = \"plane-stress\"\nthickness = \"1 mm\"\nhorizon = \
          \"6 mm\"\npoints = \"{}\"
 [material]\nyoungs_modulus = \"1 MPa\"\nlaw = \"linear\"\n[[boundary]]\nside = \"x-\"\nlayers = \
 1\n\
@@ -312,8 +323,9 @@ fn examples_of_the_guide_read_the_last_step() {
     let (head, tail) = SHEET.split_once("[output]").unwrap();
     assert!(tail.contains("fields = false"));
     let scene = format!(
-        "{}{fields}[[boundary]]\nside = \"x-\"\ndisplacement = [\"0 mm\", \"0 mm\"]\n[[boundary]]\n\
-        side = \
+        "{}{fields}[[boundary]]\nside = \"x-\"\ndisplacement = [\"0 mm\", \"0 mm\"]\n[[boundary]]\nside = \
+=======
+        "{}{fields}[[boundary]]\nside = \"x-\"\ndisplacement = [\"0 mm\", \"0 mm\"]\n[[boundary]]\nside = \
          \"x+\"\ndisplacement = [\"6 mm\", \"0 mm\"]\n[solver]\nsteps = 3\n",
         head.replace("\"2 mm\"", "\"5 mm\"")
             .replace("\"0 mm\"", "\"-40 mm\"")
@@ -348,7 +360,10 @@ fn examples_of_the_guide_read_the_last_step() {
         if !has(module) {
             eprintln!(
                 "skipped: {python} has no {module} (`pip install {module}`, or name a Python with it in \
-                POLY_VTK_PYTHON)"
+                 POLY_VTK_PYTHON)"
+>>=======
+                 POLY_VTK_PYTHON)"
+>>>>>>> theirs
             );
             continue;
         }

@@ -11,7 +11,11 @@ use peri::solver::{
     Breaking, DynamicRelaxation, Lbfgs, Method, Policy, State, Status, System, VelocityVerlet,
 };
 
-/// Makes a material ready for solvers in a body.
+/// Builds the response of a material in a body.
+pub type Make<'m, const D: usize> = &'m dyn Fn(&dyn Bonds<D>) -> Box<dyn Response<D> + 'm>;
+
+=======
+/// Builds the response of a material in a body.
 pub type Make<'m, const D: usize> = &'m dyn Fn(&dyn Bonds<D>) -> Box<dyn SolverMaterial<D> + 'm>;
 
 /// Body under test: bonds, the response of a material, and positions.

@@ -102,8 +102,9 @@ fn any_material() {
     assert!(opening(1e-3) > 3.0 * opening(23e-3), "{} {}", opening(1e-3), opening(23e-3));
 }
 
-/// A law of the caller at any scale equals the named law of its shape, and so does the stretch of a
-/// fracture
+/// A law of the caller at any scale equals the named law of its shape, and so does the stretch of a fracture
+=======
+/// A law of the caller at any scale equals the named law of its shape, and so does the stretch of a fracture
 /// energy.
 #[test]
 fn a_law_of_the_caller() {

@@ -246,10 +246,11 @@ stop_below = 0.02
     ))
 }
 
-/// A strip of 20 mm² breaks in its weak layer at E (λ − 1) A = 2.0 N, λ = 1.05; without the
-/// layer it carries
-/// more than twice that. Layers of one spacing, of a tenth between two columns of particles,
-/// two layers, and
+/// A strip of 20 mm² breaks in its weak layer at E (λ − 1) A = 2.0 N, λ = 1.05; without the layer it carries
+/// more than twice that. Layers of one spacing, of a tenth between two columns of particles, two layers, and
+=======
+/// A strip of 20 mm² breaks in its weak layer at E (λ − 1) A = 2.0 N, λ = 1.05; without the layer it carries
+/// more than twice that. Layers of one spacing, of a tenth between two columns of particles, two layers, and
 /// an oblique staircase.
 #[test]
 fn weak_layers_break_at_their_own_strength() {
@@ -257,7 +258,10 @@ fn weak_layers_break_at_their_own_strength() {
         let end = x + width;
         format!(
             "{{ shape = {{ add = \"box\", min = [\"{x} mm\", \"-5 mm\"], max = [\"{end} mm\", \"5 mm\"] }}, \
-            critical = {{ stretch = {stretch} }} }}"
+             critical = {{ stretch = {stretch} }} }}"
+>>=======
+             critical = {{ stretch = {stretch} }} }}"
+>>>>>>> theirs
         )
     };
     let layers = [
@@ -285,8 +289,10 @@ space = "solid"
 spacing = "1 mm"
 shapes = [{ add = "box", min = ["-6 mm", "-6 mm", "-9 mm"], max = ["6 mm", "6 mm", "9 mm"] }]
 cracks = [
- { from = ["-7 mm", "-7 mm", "0.13 mm"], to = ["0.5 mm", "-7 mm", "0.71 mm"], and = ["-7 mm", "7 mm", "0.13 mm"] },
- { from = ["0.5 mm", "-7 mm", "0.71 mm"], to = ["7 mm", "-7 mm", "0.29 mm"], and = ["0.5 mm", "7 mm", "CORNER mm"] },
+ { from = ["-7 mm", "-7 mm", "0.13 mm"], to = ["0.5 mm", "-7 mm", "0.71 mm"], and = [
+  "-7 mm", "7 mm", "0.13 mm"] },
+ { from = ["0.5 mm", "-7 mm", "0.71 mm"], to = ["7 mm", "-7 mm", "0.29 mm"], and = [
+  "0.5 mm", "7 mm", "CORNER mm"] },
 ]
 [material]
 youngs_modulus = "2 MPa"
@@ -344,8 +350,9 @@ displacement = ["0 mm", "1 mm"]
     };
     let two = |x: f64, y: f64| {
         strip(&format!(
-            "{{ from = [\"-1 mm\", \"10 mm\"], to = [\"5 mm\", \"10.2 mm\"] }}, {{ from = [\"{x} mm\", \
-            \"{y} \
+            "{{ from = [\"-1 mm\", \"10 mm\"], to = [\"5 mm\", \"10.2 mm\"] }}, {{ from = [\"{x} mm\", \"{y} \
+=======
+            "{{ from = [\"-1 mm\", \"10 mm\"], to = [\"5 mm\", \"10.2 mm\"] }}, {{ from = [\"{x} mm\", \"{y} \
              mm\"], to = [\"11 mm\", \"9.9 mm\"] }}"
         ))
     };

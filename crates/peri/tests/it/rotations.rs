@@ -1,5 +1,6 @@
-//! Boundaries that rotate along the arc: a twisted bar against torsion of a neo-Hookean cylinder, bodies
-//! that
+//! Boundaries that rotate along the arc: a twisted bar against torsion of a neo-Hookean cylinder, bodies that
+=======
+//! Boundaries that rotate along the arc: a twisted bar against torsion of a neo-Hookean cylinder, bodies that
 //! rotate as a whole.
 
 use harness::case::{Case, Options, Run};
@@ -33,7 +34,8 @@ program = "peri"
 [body]
 space = "solid"
 spacing = "1 mm"
-shapes = [{{ add = "cylinder", centre = ["0 mm", "0 mm", "0 mm"], radius = "5 mm", length = "32 mm", axis = "z" }}]
+shapes = [{{ add = "cylinder", centre = [
+ "0 mm", "0 mm", "0 mm"], radius = "5 mm", length = "32 mm", axis = "z" }}]
 [material.solid]
 law = "eight-chain"
 shear_modulus = "0.4 MPa"
@@ -78,8 +80,9 @@ fn a_bar_twisted_along_the_arc() {
     let slice = |name: &str, z: f64| {
         let (low, high) = (z - 0.5, z + 0.5);
         format!(
-            "[[probe]]\nname = \"{name}\"\ntrack = \"rotation\"\naxis = \"z\"\n\
-            min = [\"-6 mm\", \"-6 mm\", \
+            "[[probe]]\nname = \"{name}\"\ntrack = \"rotation\"\naxis = \"z\"\nmin = [\"-6 mm\", \"-6 mm\", \
+=======
+            "[[probe]]\nname = \"{name}\"\ntrack = \"rotation\"\naxis = \"z\"\nmin = [\"-6 mm\", \"-6 mm\", \
              \"{low} mm\"]\nmax = [\"6 mm\", \"6 mm\", \"{high} mm\"]\n"
         )
     };
@@ -124,8 +127,9 @@ displacement = [\"0 mm\", \"0 mm\", \"free\"]";
     assert!(value(&free, "end") > 1e-5, "{} m", value(&free, "end"));
 }
 
-/// A body follows a full rotation of a region without stretching any bond in any step, and ends
-/// in its
+/// A body follows a full rotation of a region without stretching any bond in any step, and ends in its
+=======
+/// A body follows a full rotation of a region without stretching any bond in any step, and ends in its
 /// initial position.
 #[test]
 fn a_full_turn_strains_nothing() {

@@ -7,7 +7,7 @@ use peri::bonds::{BodyGeometry, BondDamage, LatticeBonds, Overstretched, Stretch
 use peri::calibrate::Space;
 use peri::field::Field;
 use peri::geometry::{Operation, Shape, lattice};
-use peri::material::{Family, Material, NonlocalSolid, PointLaw, Pointwise, Response};
+use peri::material::{Family, Material, NonlocalSolid, PointLaw, Pointwise, SolverMaterial};
 
 /// Solid by plain loops over bonds, without its kernels.
 pub struct PlainLoops<M>(pub M);
@@ -69,7 +69,7 @@ fn kernels_are_plain_loops<const D: usize>(space: Space, side: usize, volume: Vo
             });
         }
         list.sort_by_key(|bond| bond.site);
-        bonds.sever(&list);
+        bonds.break_bonds(&list);
         let mut found = Vec::new();
         for material in [&mut fast, &mut plain] {
             material.prepare(&bonds, &displacement);
@@ -134,7 +134,7 @@ fn a_broken_bond_releases_its_energy() {
             length: 1.0,
             weight: 1.0,
         };
-        bonds.sever(&[entry(site, bond.index), entry(bond.site, count - 1 - bond.index)]);
+        bonds.break_bonds(&[entry(site, bond.index), entry(bond.site, count - 1 - bond.index)]);
         let released = before - states.energy(&bonds, &displacement, StretchRange::REST);
         (released / said - 1.0).abs()
     }

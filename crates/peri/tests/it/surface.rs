@@ -70,7 +70,10 @@ fn plate(spacing: f64, volume: VolumeCorrection, surface: bool) -> [f64; 3] {
     let one_point = largest(piola_on_lattice(&bonds, &loaded, StressMethod::OnePoint, BallVolume::Particles));
     eprintln!(
         "dx = {spacing}, {volume:?}, surface {surface}: strain {:.4}, hardy {hardy:.3}, one-point \
-        {one_point:.3}, {} its",
+         {one_point:.3}, {} its",
+>>=======
+         {one_point:.3}, {} its",
+>>>>>>> theirs
         strain / stress,
         state.counts.total_iterations
     );

@@ -283,8 +283,12 @@ fn areas_of_cracks() {
     near("crack_area_solid", area.area::<3>(&solid), exact, 1e-12);
 }
 
-/// Output of `peri check` for a scene.
-fn told(text: &str, folder: &Path) -> String {
+/// Returns the output of `peri check`.
+fn check_output(text: &str, folder: &Path) -> String {
+>>=======
+/// Returns the output of `peri check`.
+fn check_output(text: &str, folder: &Path) -> String {
+>>>>>>> theirs
     let source = Source::new(folder.join("scene.toml"), text);
     let scene = source.parse::<Scene>().unwrap_or_else(|error| panic!("{}", error.render()));
     explanation(&source, &scene, false).unwrap_or_else(|error| panic!("{error}")).join("\n")
@@ -333,13 +337,20 @@ fn causes_of_other_energies_are_named() {
         .replace("thickness = \"1 mm\"\n", "")
         .replace(
             "\"-12 mm\"], max = [\"80 mm\", \"12 mm\"]",
-            "\"-12 mm\", \"0 mm\"], max = [\"80 mm\", \
-        \"12 mm\", \"6 mm\"]",
+            "\"-12 mm\", \"0 mm\"], max = [\"80 mm\", \"12 \
+            mm\", \"6 mm\"]",
+>>=======
+            "\"-12 mm\", \"0 mm\"], max = [\"80 mm\", \"12 \
+            mm\", \"6 mm\"]",
+>>>>>>> theirs
         )
         .replace(
             "from = [\"-1 mm\", \"0 mm\"], to = [\"40 mm\", \"0 mm\"]",
             "from = [\"-1 mm\", \"0 mm\", \
-        \"-1 mm\"], to = [\"40 mm\", \"0 mm\", \"-1 mm\"], and = [\"-1 mm\", \"0 mm\", \"7 mm\"]",
+            \"-1 mm\"], to = [\"40 mm\", \"0 mm\", \"-1 mm\"], and = [\"-1 mm\", \"0 mm\", \"7 mm\"]",
+>>=======
+            \"-1 mm\"], to = [\"40 mm\", \"0 mm\", \"-1 mm\"], and = [\"-1 mm\", \"0 mm\", \"7 mm\"]",
+>>>>>>> theirs
         )
         .replace("[\"0 mm\", \"0 mm\"]", "[\"0 mm\", \"0 mm\", \"free\"]")
         .replace("[\"0 mm\", \"0.4 mm\"]", "[\"0 mm\", \"0.4 mm\", \"free\"]");

@@ -229,7 +229,10 @@ fn crack_speed(rows: usize, drive: f64, law: Law) -> f64 {
     let took = last.released / (toughness * (tips.last().map_or(0.0, |t| t[1]) - 1.0));
     eprintln!(
         "{rows} rows: {speed:.3} c_R, in parts {parts:.3?}; {} broken, {} steps, {} forces, strain {:.3} of \
-        critical; \
+         critical; \
+>>=======
+         critical; \
+>>>>>>> theirs
          released {took:.2} G a length, energies off by {off:.1e}",
         state.fracture.broken,
         state.counts.total_iterations,

@@ -26,8 +26,10 @@ pub fn quantities_of(source: &Source, scene: &Scene) -> Result<Vec<String>, Scen
                     let compared = scene.output.compare.as_ref().filter(|c| c.quantity == name).is_some();
                     names.extend(compared.then(|| q::COMPARED.of(&[&name, &variant.name()]).name));
                     names.extend(compared.then(|| q::SAME_EVENTS.of(&[&variant.name()]).name));
-                    names
-                        .extend(q::BALANCES.iter().any(|balance| balance.name == name).then(|| name.clone()));
+                    let is_balance = q::BALANCES.iter().any(|balance| balance.name == name);
+                    if is_balance && !names.contains(&name) {
+                        names.push(name.clone());
+                    }
                     names.push(scene::NAMING.value(&variant.of.name, &name));
                 }
             }

@@ -129,7 +129,7 @@ pub fn peak_lines(outcomes: &[VariantOutcome]) -> String {
                 outcome.history.get(peak + 1).is_some_and(|r| r.factor < outcome.history[peak].factor);
             let within = match lowered {
                 true => String::new(),
-                false => format!(", ± one load step: {apart:.3} mm, {least:.3} N"),
+                false => format!(", resolved to a load step of {apart:.3} mm, {least:.3} N"),
             };
             format!("{name}: peak {load:.5} N at {at:.5} mm{within}\n")
         })

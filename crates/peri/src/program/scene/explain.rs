@@ -127,11 +127,19 @@ pub fn explain<const D: usize>(
     .collect();
     lines.extend(wrapped_list("leaves out", &left_out));
     let names: Vec<String> = reports.iter().map(|named| Named::list([named])).collect();
-    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let mut names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let more = format!("and {} more in report.json", names.len().saturating_sub(LISTED_REPORTS));
+    if names.len() > LISTED_REPORTS {
+        names.truncate(LISTED_REPORTS);
+        names.push(&more);
+    }
     lines.extend(wrapped_list("reports", &names));
     lines.extend(super::warnings(source, scene, body).into_iter().map(|text| format!("  warning    {text}")));
     Ok(lines)
 }
+
+/// Names of scalars that `check` lists.
+const LISTED_REPORTS: usize = 40;
 
 /// Characters of a line of `check` that lists names.
 const LINE_WIDTH: usize = 100;
