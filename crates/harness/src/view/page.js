@@ -178,7 +178,8 @@ async function choose(index) {
   at("fields").closest("label").hidden = !told.fields.length;
   options(at("scale"), (solid.moves ? SCALES : [1]).map(String), solid.moves ? 1 : 0);
   [...at("scale").options].forEach((option) => { option.value = option.text; });
-  at("stage-notes").textContent = told.notes.length ? `Shown: ${told.notes.join("; ")}.` : "";
+  at("stage-notes").hidden = !told.notes.length;
+  at("stage-notes").lastElementChild.textContent = `${told.notes.join("; ")}.`;
   draw();
   stage.reset();
 }
