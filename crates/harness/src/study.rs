@@ -27,7 +27,7 @@ crate::quantities! {
     pub OF_STUDIES:
     LIMIT = "{convergence}.limit", "*", "value that three studies tend to, after Richardson";
     ORDER = "{convergence}.order", "", "observed order of these studies";
-    ERROR_OF = "{curve}.error_of_{study}", "", "root mean square of the errors of a study, in the unit of its quantities, in an error-against-time curve";
+    ERROR_OF = "{curve}.error_of_{study}", "", "rms error of a study in an error-against-time curve, in its unit";
 }
 
 /// A `T` of the scene that a study gives: read where it stands in for the scene's own.
@@ -165,7 +165,9 @@ impl Naming {
     fn check(self, source: &Source, key: &str, name: Option<&str>) -> Result<(), SceneError> {
         let stops = |c: char| c.is_control() || "/\\[]".contains(c);
         match (self, name) {
-            (Self::Folders, None) => Err(source.error(key, "nothing", "a name: values and a folder have it")),
+            (Self::Folders, None) => {
+                Err(source.missing(key, "the values and the folder of a study have its name"))
+            }
             (Self::Folders, Some(name)) => check_name(source, key, name),
             (Self::Brackets, Some(name)) if name.contains(stops) => {
                 let allowed = "a name without `/`, `\\`, `[`, `]`: files and values have it";

@@ -162,7 +162,8 @@ pub fn main<C: Case, V: Subcommand>(own: impl FnOnce(V) -> Result<bool, Failure<
         .version(program.version)
         .about(program.about)
         .after_help(format!(
-            "Examples:\n{}\n\nExit codes: 0 done, 1 an expectation or the run failed, 2 bad input, 130 interrupted.",
+            "Examples:\n{}\n\n\
+             Exit codes: 0 done, 1 an expectation or the run failed, 2 bad input, 130 interrupted.",
             program.examples
         ));
     let matches = command.clone().get_matches();

@@ -218,7 +218,7 @@ impl InputArguments {
         self.inputs.iter().map(|placed| (placed.name.clone(), placed.output.clone())).collect()
     }
 
-    fn of(&self, source: &Source, output: &Path) -> Result<Vec<Input>, SceneError> {
+    fn list(&self, source: &Source, output: &Path) -> Result<Vec<Input>, SceneError> {
         inputs(source, output, &self.placed())
     }
 }
@@ -230,7 +230,7 @@ pub(super) fn describe(
     quick: bool,
     arguments: &InputArguments,
 ) -> Result<(), SceneError> {
-    let inputs = arguments.of(source, output)?;
+    let inputs = arguments.list(source, output)?;
     if !inputs.is_empty() {
         crate::say!("inputs");
     }

@@ -306,7 +306,8 @@ impl<'a> Run<'a> {
         match finished().or_else(begun).and_then(|path| file(&path)) {
             Some(other) if file(&self.source.path).is_some_and(|own| own != other) => {
                 let reason = format!(
-                    "it has the results of another scene, {}; choose another folder with --output, or remove this one",
+                    "it has the results of another scene, {}; choose another folder with --output, or \
+                     remove this one",
                     other.display()
                 );
                 Err(Error::OutputDirectory { path: directory.to_path_buf(), reason })

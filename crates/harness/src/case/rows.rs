@@ -57,7 +57,7 @@ impl Rows {
     }
 
     /// Returns whether some run has a value.
-    pub fn has(&self, name: &str) -> bool {
+    pub fn has_value(&self, name: &str) -> bool {
         self.reports().any(|report| report.scalar(name).is_some())
     }
 
@@ -74,7 +74,7 @@ impl Rows {
     }
 
     /// Names of values that the further columns ask for, in the order of the columns, numbers by their size.
-    pub fn asked(&self) -> Vec<String> {
+    pub fn requested(&self) -> Vec<String> {
         let mut names: Vec<String> = Vec::new();
         for pattern in &self.columns {
             let fit = |name: &&String| matches_pattern(pattern, name);
@@ -92,7 +92,7 @@ impl Rows {
     pub fn names(&self) -> Vec<String> {
         let fields = self.fields();
         let statistics = fields.iter().flat_map(|field| STATISTICS.map(|name| format!("{name}{field}")));
-        statistics.chain(self.asked()).collect()
+        statistics.chain(self.requested()).collect()
     }
 
     /// Returns whether some run has expectations.
@@ -120,7 +120,7 @@ impl Rows {
         let mut head = vec!["run".to_owned()];
         head.extend(self.settings.iter().cloned());
         head.extend(fields.iter().map(|name| format!("{name}: mean (least to largest) ± deviation")));
-        let asked = self.asked();
+        let asked = self.requested();
         head.extend(asked.iter().map(|name| self.heading(name)));
         if self.judged() {
             head.push(ENDS.into());
@@ -203,7 +203,9 @@ pub(crate) fn matches_pattern(pattern: &str, name: &str) -> bool {
     match pattern.split_once('*') {
         None => pattern == name,
         Some((before, after)) => name.strip_prefix(before).is_some_and(|rest| {
-            (0..=rest.len()).filter(|&at| rest.is_char_boundary(at)).any(|at| matches_pattern(after, &rest[at..]))
+            (0..=rest.len())
+                .filter(|&at| rest.is_char_boundary(at))
+                .any(|at| matches_pattern(after, &rest[at..]))
         }),
     }
 }
@@ -227,8 +229,16 @@ mod tests {
 
     #[test]
     fn patterns_and_their_order() {
-        assert!(matches_pattern("layer-*.mean_alpha", "layer-12.mean_alpha") && matches_pattern("a", "a") && matches_pattern("*", ""));
-        assert!(!matches_pattern("layer-*.mean_alpha", "layer-1.least_alpha") && !matches_pattern("a", "ab") && !matches_pattern("a*b", "a"));
+        assert!(
+            matches_pattern("layer-*.mean_alpha", "layer-12.mean_alpha")
+                && matches_pattern("a", "a")
+                && matches_pattern("*", "")
+        );
+        assert!(
+            !matches_pattern("layer-*.mean_alpha", "layer-1.least_alpha")
+                && !matches_pattern("a", "ab")
+                && !matches_pattern("a*b", "a")
+        );
         let mut names = ["layer-10.x", "layer-9.x", "layer-9.a"];
         names.sort_by_key(|name| natural(name));
         assert_eq!(names, ["layer-9.a", "layer-9.x", "layer-10.x"]);

@@ -155,7 +155,7 @@ fn rows<C: Case>(
     let mut runs = runs::<C>(source, vary, options.quick)?;
     if let Part::Shard(shard) = options.part {
         let mut numbers = 0..runs.len();
-        runs.retain(|_| numbers.next().is_some_and(|number| shard.has(number)));
+        runs.retain(|_| numbers.next().is_some_and(|number| shard.contains(number)));
         polycore::file::prepare_directory(options.output)?;
         let _lock = crate::case::share_run(options.output)?;
         let rows = rows_of(&C::PROGRAM, &runs, solve::<C>(&runs, options)?, vary, options);
@@ -167,8 +167,8 @@ fn rows<C: Case>(
         && let Some((number, run)) = (1..).zip(&runs).find(|(_, run)| run.finished(options.output).is_none())
     {
         let reason = format!(
-            "found run {number} of {}, {}, unfinished or of another scene; allowed: finished runs, of `--shard 1/N` to \
-             `--shard N/N` into {}",
+            "found run {number} of {}, {}, unfinished or of another scene; allowed: finished runs, of \
+             `--shard 1/N` to `--shard N/N` into {}",
             runs.len(),
             run.name,
             options.output.display()
@@ -324,7 +324,10 @@ fn solve<C: Case>(
         }
     });
     let (outcomes, _) = finished.into_inner().unwrap_or_else(PoisonError::into_inner);
-    let stopped = |outcome: &Result<Report, Failure<C::Error>>| matches!(outcome, Err(Failure::Run(error)) if error.is_interruption());
+    let stopped = |outcome: &Result<Report, Failure<C::Error>>| match outcome {
+        Err(Failure::Run(error)) => error.is_interruption(),
+        _ => false,
+    };
     if outcomes.len() < runs.len() || outcomes.values().any(stopped) {
         return Err(Error::SweepInterrupted(output.to_path_buf()).into());
     }

@@ -56,7 +56,7 @@ struct Layout {
 
 impl Layout {
     /// Checks arrays against the number of points and cells.
-    fn of(counts: [usize; 2], point_data: &[Data<'_>], cell_data: &[Data<'_>]) -> Result<Self, Error> {
+    fn from_data(counts: [usize; 2], point_data: &[Data<'_>], cell_data: &[Data<'_>]) -> Result<Self, Error> {
         let arrays = named("point", counts[0], point_data)?;
         let cell_arrays = named("cell", counts[1], cell_data)?;
         Ok(Self { points: counts[0], arrays, cells: counts[1], cell_arrays, moments: Vec::new() })

@@ -13,9 +13,9 @@ use polycore::units::Ratio;
 ///
 /// ```toml
 /// [[expect]]
-/// quantity = "stress_concentration"   # the name of a scalar of the report, or a quotient of two: "NAME / NAME"
+/// quantity = "stress_concentration"   # a scalar of the report, or a quotient of two: "NAME / NAME"
 /// reference = 3.0
-/// tolerance = "1 %"                   # of |reference|; or a plain number, absolute, in the unit of the value
+/// tolerance = "1 %"                   # of |reference|; or a number in the unit of the value
 /// kind = "closed-form"                # what kind of evidence the figure is: see [`Kind`]
 /// source = "Kirsch (1898), infinite plate"
 /// quick = false                       # optional: not judged in --quick runs
@@ -268,7 +268,7 @@ impl TryFrom<Written> for Expect {
             }
             _ => {
                 return Err(format!(
-                    "expectation of `{quantity}`: give either `reference` and `tolerance`, or `at_least` and/or `at_most`"
+                    "expectation of `{quantity}`: give `reference` and `tolerance`, or `at_least`, `at_most` or both"
                 ));
             }
         };

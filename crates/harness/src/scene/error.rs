@@ -151,7 +151,9 @@ impl SceneError {
             format!("missing `version`; allowed: `version = {VERSION}`{}", suggestion.unwrap_or_default());
         let span = similar.map_or(0..0, |(_, span)| span);
         let help = Some(format!("begin the file with `version = {VERSION}`"));
-        Self::from_span(source, "scene::version", Some("version".into()), span, message).label("here").help(help)
+        Self::from_span(source, "scene::version", Some("version".into()), span, message)
+            .label("here")
+            .help(help)
     }
 
     pub(super) fn bad_version(source: &Source, span: Range<usize>) -> Self {
@@ -289,7 +291,8 @@ fn advice(name: &str) -> Option<&'static str> {
         "reducedpolynomial" => "the reduced polynomial of third order is `yeoh` here",
         "prony" | "viscoelastic" => "rates and relaxation are not modelled: laws are elastic",
         "poissonratio" | "poissonsratio" => {
-            "Poisson's ratio follows from `bulk_modulus` and the shear modulus, ν = (3K − 2G)/(6K + 2G), or from the law"
+            "Poisson's ratio follows from `bulk_modulus` and the shear modulus, ν = (3K − 2G)/(6K + 2G), or \
+             from the law"
         }
         _ => return None,
     })

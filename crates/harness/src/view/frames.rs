@@ -79,7 +79,7 @@ impl FrameReader {
     ///
     /// # Errors
     /// Those of reading a damaged file.
-    pub fn at<T>(
+    pub fn read_step<T>(
         &self,
         step: usize,
         read: impl FnOnce(&Series, usize) -> Result<T, Error>,

@@ -48,8 +48,9 @@ function header() {
     details.append(make("summary", "What this page leaves out"), make("p", run.left_out.join("; ")));
     at("notes").append(details);
   }
-  if (!run.bodies.length && run.tables.length) {
-    at("notes").append(make("p", "The run has written no fields: in a scene, `[output] fields = true`."));
+  if (!run.bodies.length) {
+    const missing = run.tables.length ? "no fields (in a scene, `[output] fields` asks for them)" : "no fields and no tables";
+    at("notes").append(make("p", `The run has written ${missing}.`));
   }
 }
 
@@ -110,7 +111,7 @@ function tables() {
   at("judged-title").textContent = `Expectations (${run.expect.length})`;
   at("only-failed").closest("label").hidden = !failed;
   searched("expect", at("find-expect"), run.expect.map((e) =>
-    row([e.pass ? "met" : "not met", e.quantity, e.value, e.bound, e.kind, e.source], !e.pass)),
+    row([e.pass ? "met" : "not met", e.quantity, e.value, e.bound, e.kind.replace("-", " "), e.source], !e.pass)),
   [["", ""], ["quantity"], ["value", "number"], ["expected", "number"], ["evidence"], ["source", "source"]], at("only-failed"));
   at("values").hidden = !run.scalars.length;
   at("values-title").textContent = `All values (${run.scalars.length})`;

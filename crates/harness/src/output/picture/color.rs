@@ -29,7 +29,7 @@ static DIVERGING: LazyLock<ColorTable> = LazyLock::new(|| table(&Kuva::RedBlue, 
 
 impl ColorMap {
     /// The colour at `share` between 0 and 1 (clamped); grey for NaN.
-    pub(super) fn at(self, share: f64) -> [u8; 3] {
+    pub(super) fn color_at(self, share: f64) -> [u8; 3] {
         if share.is_nan() {
             return MISSING;
         }

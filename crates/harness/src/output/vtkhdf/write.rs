@@ -33,7 +33,12 @@ type MeshContent = (Vec<[f64; 3]>, Cells);
 
 impl Writer {
     /// A file for exactly `steps` steps; of particles where there is no mesh.
-    pub fn create(path: &Path, layout: &Layout, mesh: Option<&MeshContent>, steps: usize) -> Result<Self, Error> {
+    pub fn create(
+        path: &Path,
+        layout: &Layout,
+        mesh: Option<&MeshContent>,
+        steps: usize,
+    ) -> Result<Self, Error> {
         Self::begin(path, layout, mesh, steps).map_err(|error| write_error(path, error))
     }
 
@@ -175,7 +180,12 @@ fn integers(group: &H5Group, name: &str, values: &[i64]) -> Hdf5Result<()> {
 }
 
 /// An empty compressed dataset with unlimited rows; a step is a chunk.
-fn table<T: rust_hdf5::H5Type>(group: &H5Group, name: &str, columns: usize, rows: usize) -> Hdf5Result<H5Dataset> {
+fn table<T: rust_hdf5::H5Type>(
+    group: &H5Group,
+    name: &str,
+    columns: usize,
+    rows: usize,
+) -> Hdf5Result<H5Dataset> {
     let chunk = rows.max(1);
     let builder = group.new_dataset::<T>();
     let builder = if columns == 1 {
