@@ -95,7 +95,7 @@ macro_rules! study {
         }
 
         impl $name {
-            /// The study as the harness resolves it.
+            /// Returns the study as the harness resolves it.
             pub fn study(&self) -> $crate::study::Study {
                 let Self { name, description, expect_error, quick, set, vary, .. } = self.clone();
                 let replaced = [$(($key, stringify!($block), self.$block.is_some()),)*];
@@ -295,7 +295,7 @@ pub trait Solved {
     /// Name.
     fn name(&self) -> &str;
 
-    /// A scalar and its unit.
+    /// Returns a scalar and its unit.
     fn scalar(&self, quantity: &str) -> Option<(f64, &str)>;
 
     /// Seconds of its solution; none if it has failed.
@@ -337,7 +337,7 @@ impl Comparisons<'_> {
         self.curves.iter().enumerate().try_for_each(|(index, spec)| spec.check(source, index, variants))
     }
 
-    /// Names of the scalars that they add to a report.
+    /// Returns names of the scalars that they add to a report.
     pub fn names(&self) -> impl Iterator<Item = Named> {
         let tables = self.convergence.iter().flat_map(|spec| [LIMIT, ORDER].map(|q| q.of(&[&spec.name])));
         let curves = self.curves.iter().flat_map(|spec| spec.studies.iter().map(|study| (&spec.name, study)));

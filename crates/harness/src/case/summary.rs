@@ -129,8 +129,8 @@ impl<'a> Names<'a> {
     }
 }
 
-/// Names of the values that matter: those that `[report]` lists, otherwise those of the first expectations,
-/// otherwise the main values of the program, otherwise the first.
+/// Returns names of the values that matter: those that `[report]` lists, otherwise those of the first
+/// expectations, otherwise the main values of the program, otherwise the first.
 pub(crate) fn main_names(report: &Report, listed: &[String], columns: &[&str]) -> Vec<String> {
     let names = Names::new(report);
     let mut found = names.fitting(listed.iter().map(String::as_str));
@@ -161,7 +161,7 @@ pub(crate) fn main_names(report: &Report, listed: &[String], columns: &[&str]) -
     found.into_iter().map(str::to_owned).collect()
 }
 
-/// The table of the main values: a row for each variant, then single values.
+/// Returns the table of the main values: a row for each variant, then single values.
 fn main_values(report: &Report, listed: &[String], columns: &[&str], width: usize) -> String {
     let names = Names::new(report);
     let shown = main_names(report, listed, columns);
@@ -280,7 +280,7 @@ fn files(output: &Path, style: &TerminalStyle) -> String {
     text + &format!("next: {} view {}   # one page with all of it\n", invocation(), output.display())
 }
 
-/// The words with which this program was called, without its arguments.
+/// Returns the words with which this program was called, without its arguments.
 fn invocation() -> String {
     let called = std::env::args().next().unwrap_or_default();
     let name = Path::new(&called).file_stem().map(|name| name.to_string_lossy().into_owned());

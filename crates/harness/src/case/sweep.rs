@@ -1,6 +1,7 @@
 //! Many runs of one scene over a grid of values: in parallel, one thread each; finished ones are kept.
 
 use super::rows::{Row, Rows};
+use super::terminal::WIDTH;
 use super::{Case, Fault, Finished, Options, Program};
 use crate::report::{Phases, Report};
 use crate::scene::{Failure, Source};
@@ -143,7 +144,8 @@ pub fn sweep<C: Case>(
     options: &mut SweepOptions,
 ) -> Result<Finished, Failure<C::Error>> {
     let (rows, bands, report) = rows::<C>(source, vary, options)?;
-    Ok(Finished::new(report, rows.text() + &bands))
+    let table = rows.short_text(WIDTH) + &bands;
+    Ok(Finished { table: Some(table), ..Finished::new(report, rows.text() + &bands) })
 }
 
 /// [`sweep`], and its rows: those requested first, in their order. And the bands of what was sampled.
@@ -253,7 +255,7 @@ fn former(vary: &[Vary], output: &Path) -> Result<Vec<Vec<String>>, Error> {
     Err(Error::Option { option: format!("--output {}", output.display()), reason })
 }
 
-/// The runs of a grid, each checked.
+/// Returns the runs of a grid, each checked.
 fn runs<C: Case>(source: &Source, vary: &[Vary], quick: bool) -> Result<Vec<Run>, Failure<C::Error>> {
     let keys: Vec<String> = vary.iter().flat_map(Vary::keys).collect();
     if let Some(twice) = (1..keys.len()).find(|&k| keys[..k].contains(&keys[k])) {

@@ -69,7 +69,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<Vec<(String, Vec<f64>)>, Error> {
     Ok(columns)
 }
 
-/// The error of the system inside: its kind says whether there is room on the disk.
+/// Returns the error of the system inside: its kind says whether there is room on the disk.
 fn plain(error: csv::Error) -> std::io::Error {
     match error.into_kind() {
         csv::ErrorKind::Io(error) => error,

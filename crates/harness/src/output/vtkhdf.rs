@@ -63,7 +63,7 @@ impl Layout {
     }
 }
 
-/// Names and numbers of components of arrays on `count` points or cells.
+/// Returns names and numbers of components of arrays on `count` points or cells.
 fn named(kind: &str, count: usize, data: &[Data<'_>]) -> Result<Vec<(String, usize)>, Error> {
     let mut arrays: Vec<(String, usize)> = Vec::new();
     for &(name, components, values) in data {

@@ -128,7 +128,7 @@ pub enum Tolerance {
 }
 
 impl Tolerance {
-    /// The accepted distance from `reference`.
+    /// Returns the accepted distance from `reference`.
     pub fn distance(self, reference: f64) -> f64 {
         match self {
             Self::Relative(share) => share * reference.abs(),
@@ -288,7 +288,7 @@ impl From<Expect> for Written {
 }
 
 impl Expect {
-    /// The scalars that it needs: one name, or the two of a quotient.
+    /// Returns the scalars that it needs: one name, or the two of a quotient.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.quantity.split(QUOTIENT)
     }
@@ -346,7 +346,7 @@ pub struct Judgement {
 }
 
 impl Judgement {
-    /// A row of a table: verdict, quantity, value, requirement, source.
+    /// Returns a row of a table: verdict, quantity, value, requirement, source.
     pub fn row(&self) -> [String; 5] {
         let verdict = if self.pass { "pass" } else { "FAIL" };
         let value = match (&self.message, self.value) {

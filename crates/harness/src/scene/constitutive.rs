@@ -76,7 +76,7 @@ impl<'de> Deserialize<'de> for Constant {
 }
 
 impl ConstitutiveSpec {
-    /// The learnt law, where the block names one; `key` is where it stands.
+    /// Returns the learnt law, where the block names one; `key` is where it stands.
     ///
     /// # Errors
     /// Another key beside it, a file that is missing, larger than the memory, or no law.
@@ -127,7 +127,7 @@ impl ConstitutiveSpec {
         read.map(Some).map_err(|found| source.error(&key, found, "a law that `mdsurrogate` wrote"))
     }
 
-    /// The law in closed form; `key` is where this block stands.
+    /// Returns the law in closed form; `key` is where this block stands.
     ///
     /// # Errors
     /// A [`SceneError`] that names the key, the value found and what is allowed.
@@ -159,7 +159,7 @@ impl ConstitutiveSpec {
     }
 }
 
-/// The parameters in the model's order, SI.
+/// Returns the parameters in the model's order, SI.
 fn values(
     given: &BTreeMap<String, Constant>,
     source: &Source,

@@ -44,28 +44,29 @@ const MOST_SHOWN: usize = 12;
 const LONGEST_LINE: usize = 2000;
 
 impl SceneError {
-    /// The whole message in one line, without the picture of the source.
+    /// Returns the whole message in one line, without the picture of the source.
     pub fn message(&self) -> &str {
         &self.0.message
     }
 
-    /// The dotted path of the key the error is about.
+    /// Returns the dotted path of the key the error is about.
     pub fn key(&self) -> Option<&str> {
         self.0.key.as_deref()
     }
 
-    /// The line, counted from 1.
+    /// Returns the line, counted from 1.
     pub fn line(&self) -> Option<usize> {
         self.0.place.as_ref().map(|place| place.line)
     }
 
-    /// The exit code for bad input.
+    /// Returns the exit code for bad input.
     pub fn exit_code(&self) -> u8 {
         EXIT_BAD_INPUT
     }
 
-    /// The message with the lines of the source it is about, as the command lines print it: one message line,
-    /// never wrapped, so that it can be searched for; in colours if standard error is a terminal.
+    /// Returns the message with the lines of the source it is about, as the command lines print it: one
+    /// message line, never wrapped, so that it can be searched for; in colours if standard error is a
+    /// terminal.
     pub fn render(&self) -> String {
         self.render_with(std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none())
     }
@@ -326,7 +327,7 @@ impl Diagnostic for SceneError {
     }
 }
 
-/// The candidate that `name` most likely stands for.
+/// Returns the candidate that `name` most likely stands for.
 pub(super) fn nearest<'a>(name: &str, candidates: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     let lower = name.to_lowercase();
     let scored = candidates
@@ -354,7 +355,7 @@ pub(super) fn scene_inside(directory: &Path) -> Option<String> {
     case.is_file().then(|| format!("did you mean {}?", case.display()))
 }
 
-/// The words between backticks.
+/// Returns the words between backticks.
 fn quoted(message: &str) -> Vec<&str> {
     message.split('`').skip(1).step_by(2).collect()
 }

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::{INPUTS, REPORT, VERSION};
 use crate::report::Quantity;
 
-/// The schema (draft 7, which editors of TOML read) of the scenes of a program: one of the types that
+/// Returns the schema (draft 7, which editors of TOML read) of the scenes of a program: one of the types that
 /// `alternatives` asks the generator for, with the `version` that every scene begins with. An expectation's
 /// `quantity` is one of `quantities`.
 ///
@@ -68,7 +68,7 @@ fn name_quantities(expect: &mut Value, quantities: &[&[Quantity]]) {
     }
 }
 
-/// A name with places in braces as a regular expression.
+/// Returns a name with places in braces as a regular expression.
 fn regex(name: &str) -> String {
     let pieces: Vec<&str> = name.split(['{', '}']).collect();
     let piece = |(index, piece): (usize, &&str)| match index % 2 {

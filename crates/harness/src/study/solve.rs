@@ -127,7 +127,7 @@ where
     }
 }
 
-/// The text of an error that the scene expects, a part of which is `text`, in place of the outcome.
+/// Returns the text of an error that the scene expects, a part of which is `text`, in place of the outcome.
 ///
 /// # Errors
 /// Any other.

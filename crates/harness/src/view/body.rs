@@ -158,7 +158,7 @@ fn chosen(count: usize, most: usize) -> Vec<usize> {
     }
 }
 
-/// The particles of a file as cells.
+/// Returns the particles of a file as cells.
 fn particles(
     frames: &FrameReader,
     steps: &[usize],
@@ -187,7 +187,7 @@ fn particles(
     Ok((choice.solid(&keep(reference), &positions, bridge).by_kind(), choice.plane))
 }
 
-/// The mesh of a file.
+/// Returns the mesh of a file.
 fn mesh(
     frames: &FrameReader,
     steps: &[usize],
@@ -223,7 +223,7 @@ fn moves(solid: &PageSolid, store: &mut Store) -> Option<PageMoves> {
     Some(PageMoves { slots, levels })
 }
 
-/// The first of the steps at which each cell exists.
+/// Returns the first of the steps at which each cell exists.
 fn births(frames: &FrameReader, steps: &[usize], solid: &PageSolid) -> Result<Option<Vec<u16>>, Error> {
     if !frames.arrays()[1].iter().any(|(name, n)| name == EXISTS && *n == 1) {
         return Ok(None);

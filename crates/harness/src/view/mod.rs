@@ -57,7 +57,7 @@ struct Found {
     tables: PageTables,
 }
 
-/// The page of a run in a folder, as HTML.
+/// Returns the page of a run in a folder, as HTML.
 ///
 /// # Errors
 /// [`Error::OutputDirectory`] for a folder without any result; [`Error::Io`], [`Error::Format`] for files

@@ -45,8 +45,8 @@ impl FromStr for Sample {
     }
 }
 
-/// The first `count` rows of all samples as values of keys that change together: samples are independent of
-/// each other. Without a `count` they are 20, or the rows of the shortest file.
+/// Returns the first `count` rows of all samples as values of keys that change together: samples are
+/// independent of each other. Without a `count` they are 20, or the rows of the shortest file.
 ///
 /// # Errors
 /// A file that is not a table of numbers, or has fewer rows.

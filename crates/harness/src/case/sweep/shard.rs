@@ -70,7 +70,8 @@ pub fn job<C: Case>(
     Ok(format!("{runs} runs in {} parts: sbatch {}", parts.min(runs), path.display()))
 }
 
-/// A SLURM job array of a sweep: `command` is its command line without `--slurm`, to be started in `folder`.
+/// Returns a SLURM job array of a sweep: `command` is its command line without `--slurm`, to be started in
+/// `folder`.
 fn script(command: &[String], folder: &Path, output: &Path, of: usize) -> String {
     let quoted = |text: &str| format!("'{}'", text.replace('\'', "'\\''"));
     let line: Vec<String> = command.iter().map(|word| quoted(word)).collect();

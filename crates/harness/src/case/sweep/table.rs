@@ -38,7 +38,7 @@ pub(super) fn together(program: &Program, source: &Source, vary: &[Vary], rows: 
     report
 }
 
-/// The numbers of values that have one unit, and the unit.
+/// Returns the numbers of values that have one unit, and the unit.
 pub(super) fn numeric(values: &[String]) -> Option<(Vec<f64>, String)> {
     let split = |text: &String| -> Option<(f64, String)> {
         // of keys that change together the first

@@ -220,8 +220,8 @@ mod tests {
         Strip { label: String::new(), range: (0.0, 1.0), colors: ColorMap::Viridis }
     }
 
-    /// The unit cube, each side of another value; edges are too few pixels away to matter in the middle of a
-    /// side.
+    /// Returns the unit cube, each side of another value; edges are too few pixels away to matter in the
+    /// middle of a side.
     fn cube(cut: Option<Plane>) -> Skin {
         let mut skin = Skin::new(cut);
         for side in 0..6 {

@@ -269,7 +269,7 @@ impl Solids {
         Ok(())
     }
 
-    /// A layout with panels of `longest` pixels that hold the bounds in each of the views.
+    /// Returns a layout with panels of `longest` pixels that hold the bounds in each of the views.
     fn layout(&self, stages: usize, views: &[View], longest: f64) -> Result<SolidLayout, String> {
         self.check(stages, views)?;
         let [low, high] = self.bounds;
@@ -366,7 +366,7 @@ mod tests {
         }
     }
 
-    /// A square across the box, further along at each stage.
+    /// Returns a square across the box, further along at each stage.
     fn stage(index: usize) -> SolidStage {
         let mut skin = Skin::new(None);
         let corner = |y: f64, z: f64| Corner { at: [1e-3 * index as f64, y, z], values: [z * 1e3, 0.5] };

@@ -185,7 +185,7 @@ impl Strips<'_> {
         Ok(())
     }
 
-    /// The stages below one another, on one axis of lengths and one colour bar a field.
+    /// Returns the stages below one another, on one axis of lengths and one colour bar a field.
     fn sheet(&self, stages: &[Stage]) -> Result<Sheet, String> {
         self.check(stages)?;
         let [across, up] = self.samples;
