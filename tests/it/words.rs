@@ -109,7 +109,7 @@ fn the_first_command_fits_a_screen() {
         "variant ",
         "hardy_first",
         "dx=4mm m=3.015",
-        " expectations met: ",
+        " expectations met (",
         "results in out: report.json",
         "view out",
     ] {

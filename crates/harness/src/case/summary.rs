@@ -231,11 +231,11 @@ fn verdict(report: &Report, style: &TerminalStyle) -> String {
     let mut text = String::new();
     if all > 0 {
         let count = |kind: Kind| report.expect.iter().filter(|one| one.expect.kind == kind).count();
-        let kinds = Kind::ALL.map(|kind| (count(kind), kind.words())).into_iter().filter(|own| own.0 > 0);
+        let kinds = Kind::ALL.map(|kind| (count(kind), kind.name())).into_iter().filter(|own| own.0 > 0);
         let kinds: Vec<String> = kinds.map(|(count, kind)| format!("{count} {kind}")).collect();
         let line = format!("{met} of {all} expectations met");
         let line = if met == all { style.green(&line) } else { style.red(&line) };
-        text += &format!("{line}: {}\n", kinds.join(", "));
+        text += &format!("{line} ({})\n", kinds.join(", "));
     } else if report.passed() {
         text += "no expectations: the scene has no [[expect]]\n";
     }
@@ -327,7 +327,7 @@ mod tests {
         assert!(rows[4].starts_with("balance  1"), "{table}");
         let listed = main_values(&report, &["error".to_owned()], &[], 100);
         assert!(listed.starts_with("variant  error\n") && !listed.contains("balance"), "{listed}");
-        assert!(verdict(&report, &TerminalStyle::plain()).starts_with("3 of 3 expectations met: 3 bounds"));
+        assert!(verdict(&report, &TerminalStyle::plain()).starts_with("3 of 3 expectations met (3 bound)"));
     }
 
     #[test]

@@ -68,15 +68,15 @@ impl Kind {
         Self::Regression,
     ];
 
-    /// Returns its name in running text, in the plural.
-    pub fn words(self) -> &'static str {
+    /// Returns its name in scenes.
+    pub fn name(self) -> &'static str {
         match self {
-            Self::ClosedForm => "closed forms",
-            Self::Published => "published figures",
-            Self::IndependentProgram => "figures of independent programs",
+            Self::ClosedForm => "closed-form",
+            Self::Published => "published",
+            Self::IndependentProgram => "independent-program",
             Self::Convergence => "convergence",
-            Self::Bound => "bounds",
-            Self::Regression => "earlier figures",
+            Self::Bound => "bound",
+            Self::Regression => "regression",
         }
     }
 

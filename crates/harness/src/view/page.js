@@ -231,6 +231,9 @@ function groups() {
   const first = ({ name, tables }) => tables.some((table) => table.main !== null)
     ? -1 : ["history", "load", "probe", "point", "profile"].indexOf(name) >>> 0;
   const list = [...found.values()].sort((a, b) => first(a) - first(b));
+  // variants in the order of the scene
+  const place = ({ name }) => run.variants.findIndex((variant) => name.endsWith(`[${variant}]`));
+  list.forEach((entry) => entry.tables.sort((a, b) => place(a) - place(b)));
   list.forEach((entry) => { entry.label = entry.tables.length === 1 ? entry.tables[0].name : `${entry.name} (${entry.tables.length})`; });
   return list;
 }
@@ -243,7 +246,7 @@ function columns() {
   options(at("x"), names, 0);
   options(at("y"), names, 1);
   // those of the scene, otherwise some of all
-  const main = group.filter((table) => table.main !== null).sort((a, b) => a.main - b.main);
+  const main = group.filter((table) => table.main !== null).sort((a, b) => a.main - b.main || group.indexOf(a) - group.indexOf(b));
   const spread = Array.from({ length: Math.min(FIRST, group.length) }, (_, k) =>
     group[Math.round(k * (group.length - 1) / Math.max(1, Math.min(FIRST, group.length) - 1))]);
   chosen = (main.length ? main : spread).slice(0, FIRST);

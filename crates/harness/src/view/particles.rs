@@ -9,6 +9,8 @@ use crate::output::lattice::{LatticeCells, NONE, Sides, joined, neighbours};
 
 /// Particles of a lattice that are drawn at most, and of a cloud, whose blocks share no corners.
 const MOST: [usize; 2] = [30_000, 8_000];
+/// Cells of a plane lattice at most: a cell is one face.
+const MOST_IN_PLANE: usize = 80_000;
 /// Largest distance of a particle from its place in the lattice, in spacings.
 const OFF: f64 = 0.05;
 /// Part of the particles with a neighbour along each axis that makes a lattice.
@@ -66,7 +68,8 @@ impl ParticleChoice {
             let kept: Vec<u32> =
                 (0..reference.len() as u32).filter(|&k| keep(&reference[k as usize])).collect();
             let coarsest = (0..3).all(|d| steps[d] >= layers[d] / LAYERS);
-            if kept.len() <= MOST[0] / coarser.max(1) || coarsest {
+            let most = if plane { MOST_IN_PLANE } else { MOST[0] };
+            if kept.len() <= most / coarser.max(1) || coarsest {
                 let sides = [0, 1, 2].map(|d| spacing[d] * steps[d] as f64);
                 return Self { kept, sides, plane, lattice: true };
             }
