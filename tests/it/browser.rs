@@ -45,8 +45,14 @@ impl Browser {
             "--enable-unsafe-swiftshader",
             &size,
         ];
+        let mut options = json!({ "args": arguments });
+        if width < 500 {
+            // no window is so narrow
+            let screen = json!({ "width": width, "height": height, "pixelRatio": 1, "touch": true });
+            options["mobileEmulation"] = json!({ "deviceMetrics": screen });
+        }
         let asked = json!({ "capabilities": { "alwaysMatch": {
-            "goog:chromeOptions": { "args": arguments },
+            "goog:chromeOptions": options,
             "goog:loggingPrefs": { "browser": "ALL", "performance": "ALL" },
         } } });
         let session = browser.ask("POST", "", &asked);
@@ -100,6 +106,13 @@ impl Browser {
             assert!(begun.elapsed() < TIME_LIMIT, "{expression} never holds: {:#?}", self.complaints());
             std::thread::sleep(Duration::from_millis(50));
         }
+    }
+
+    /// Faults of the layout: texts that overlap, are cut off or stand outside of the window, and controls without a name.
+    #[track_caller]
+    pub fn layout_faults(&self) -> Vec<Value> {
+        let script = json!({ "script": include_str!("layout.js"), "args": [] });
+        self.ask("POST", "/execute/sync", &script).as_array().unwrap().clone()
     }
 
     #[track_caller]

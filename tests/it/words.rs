@@ -1,7 +1,8 @@
 //! Messages of `crystfem` for mistakes that would pass in silence, and their number.
 
+use crate::browser::Browser;
 use crate::parts::BAR;
-use crate::program::{Ended, command, finish};
+use crate::program::{Ended, command, finish, peri, workspace};
 use std::fs;
 use std::path::Path;
 
@@ -96,6 +97,45 @@ fn few_lines() {
     let ended = crystfem("run bar.toml --output out --verbose", here).with_code(0);
     assert!(ended.stdout.lines().count() < 40, "{}", ended.stdout);
     ended.shows(" more values in report.json");
+}
+
+/// The first command of the README, at its coarse spacings: a screen of text, a handful of files.
+#[test]
+fn the_first_command_fits_a_screen() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    let case = workspace().join("cases/ch2/plate-with-hole/case.toml");
+    let line = format!("run {} --quick --output out", case.display());
+    let ended = peri(&line, here).with_code(0);
+    let lines: Vec<&str> = ended.stdout.lines().collect();
+    assert!(lines.len() <= 25 && lines.iter().all(|line| line.chars().count() <= 100), "{}", ended.stdout);
+    assert_eq!(lines[0], "Plate with a hole");
+    for shown in [
+        "variant ",
+        "hardy_first",
+        "dx=4mm m=3.015",
+        " expectations met (",
+        "results in out: report.json",
+        "view out",
+    ] {
+        ended.shows(shown);
+    }
+    let files: Vec<u64> =
+        fs::read_dir(here.join("out")).unwrap().map(|file| file.unwrap().metadata().unwrap().len()).collect();
+    assert!(files.len() <= 12 && files.iter().sum::<u64>() < 20_000_000, "{files:?}");
+    peri("view out", here).with_code(0);
+    for size in [[1400, 1000], [390, 800]] {
+        let Some(browser) = Browser::open(&here.join("out/view.html"), size) else { return };
+        browser.wait("document.body.dataset.ready");
+        browser.picture(&format!("plate-{}.txt", size[0]));
+        assert_eq!(browser.layout_faults(), Vec::<serde_json::Value>::new(), "{size:?}");
+        assert_eq!(browser.value("chart.lines.length"), 3, "the curves that the scene lists");
+        browser.click("#theme");
+        browser.press("#find-value", "force_imb");
+        browser.wait("document.querySelectorAll('#scalars tbody tr').length < 5");
+        assert_eq!(browser.layout_faults(), Vec::<serde_json::Value>::new(), "{size:?}, dark");
+        assert_eq!(browser.complaints(), Vec::<serde_json::Value>::new());
+    }
 }
 
 /// Values of layers and the expectations of each run in the table of a sweep, which a shorter sweep keeps.

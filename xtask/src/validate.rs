@@ -115,7 +115,7 @@ pub fn run(workspace: &Repository, options: &Options) -> Result<bool> {
     if let Some(shard) = options.shard {
         let chains = chains(&cases);
         let mut chains = chains.iter();
-        cases.retain(|_| chains.next().is_some_and(|&chain| shard.has(chain)));
+        cases.retain(|_| chains.next().is_some_and(|&chain| shard.contains(chain)));
     }
     // read before the long run begins
     let map = report::Sources::read(workspace, options.baseline.as_deref())?;

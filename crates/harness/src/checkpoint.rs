@@ -121,12 +121,12 @@ pub fn read<T: DeserializeOwned>(path: &Path, magic: &Magic) -> Result<T, Error>
     decode(path, rest)
 }
 
-/// The bytes of a value in the checkpoint at `path`.
+/// Returns the bytes of a value in the checkpoint at `path`.
 pub(crate) fn encode(path: &Path, value: &impl Serialize) -> Result<Vec<u8>, Error> {
     postcard::to_stdvec(value).map_err(|error| refused(path, error))
 }
 
-/// A value of [`encode`].
+/// Decodes a value of [`encode`].
 pub(crate) fn decode<T: DeserializeOwned>(path: &Path, bytes: &[u8]) -> Result<T, Error> {
     postcard::take_from_bytes(bytes).map(|(value, _)| value).map_err(|error| refused(path, error))
 }

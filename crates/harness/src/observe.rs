@@ -209,7 +209,7 @@ impl<'a, S: ?Sized> Fields<'a, S> {
 pub struct Observers<'a, S: ?Sized, E>(pub Vec<Box<dyn Observer<S, E> + Send + 'a>>);
 
 impl<S: ?Sized, E> Observers<'_, S, E> {
-    /// Names of all scalars.
+    /// Returns names of all scalars.
     pub fn names(&self) -> Vec<Named> {
         let mut names = Vec::new();
         let take = &mut |named, _| names.push(named);

@@ -98,7 +98,8 @@ pub struct Trial {
 }
 
 impl Report {
-    /// An empty report; `scene_text` is the scene as it was run (with its defaults resolved, where known).
+    /// Returns an empty report; `scene_text` is the scene as it was run (with its defaults resolved, where
+    /// known).
     pub fn new(program: &str, version: &str, scene_text: &str) -> Self {
         Self {
             passed: true,
@@ -154,7 +155,7 @@ impl Report {
         self
     }
 
-    /// A scalar by name.
+    /// Returns a scalar by name.
     pub fn scalar(&self, name: &str) -> Option<f64> {
         match self.values.get(name)? {
             Value::Scalar { value, .. } => Some(*value),
@@ -223,7 +224,7 @@ impl Report {
         })
     }
 
-    /// The scalars, work, times and judged expectations as text.
+    /// Returns the scalars, work, times and judged expectations as text.
     pub fn table(&self) -> String {
         self.table_of(|_| true)
     }
@@ -263,7 +264,7 @@ impl Report {
         (of_it().filter(|j| j.pass).count(), missed)
     }
 
-    /// The judged expectations and what is not finite, as text.
+    /// Returns the judged expectations and what is not finite, as text.
     pub fn verdict(&self) -> String {
         let mut text = String::new();
         text += &aligned(&self.expect.iter().map(Judgement::row).collect::<Vec<_>>());
@@ -343,7 +344,7 @@ impl Phases {
         }
     }
 
-    /// The ended phases in order of first appearance.
+    /// Returns the ended phases in order of first appearance.
     pub fn seconds(&self) -> impl Iterator<Item = (&str, f64)> {
         self.done.iter().map(|(phase, seconds)| (phase.as_str(), *seconds))
     }

@@ -80,7 +80,7 @@ pub struct Source {
 }
 
 impl Source {
-    /// A scene that does not lie in a file; `path` only names it in messages.
+    /// Returns a scene that does not lie in a file; `path` only names it in messages.
     pub fn new(path: impl Into<PathBuf>, text: impl Into<String>) -> Self {
         Self {
             path: path.into(),
@@ -230,7 +230,8 @@ fn check_report(table: Spanned<DeValue<'_>>) -> Result<(), toml::de::Error> {
     ReportSpec::deserialize(toml::de::ValueDeserializer::from(table)).map(drop)
 }
 
-/// The fault of the key `program` alone: where the scene is another program's, all other keys are, too.
+/// Returns the fault of the key `program` alone: where the scene is another program's, all other keys are,
+/// too.
 fn wrong_program<T: DeserializeOwned>(root: &Spanned<DeTable<'_>>) -> Option<toml::de::Error> {
     let (key, value) = root.get_ref().get_key_value("program")?;
     let mut alone = DeTable::new();

@@ -27,7 +27,7 @@ crate::quantities! {
     pub OF_STUDIES:
     LIMIT = "{convergence}.limit", "*", "value that three studies tend to, after Richardson";
     ORDER = "{convergence}.order", "", "observed order of these studies";
-    ERROR_OF = "{curve}.error_of_{study}", "", "root mean square of the errors of a study, in the unit of its quantities, in an error-against-time curve";
+    ERROR_OF = "{curve}.error_of_{study}", "", "rms error of a study in an error-against-time curve, in its unit";
 }
 
 /// A `T` of the scene that a study gives: read where it stands in for the scene's own.
@@ -95,7 +95,7 @@ macro_rules! study {
         }
 
         impl $name {
-            /// The study as the harness resolves it.
+            /// Returns the study as the harness resolves it.
             pub fn study(&self) -> $crate::study::Study {
                 let Self { name, description, expect_error, quick, set, vary, .. } = self.clone();
                 let replaced = [$(($key, stringify!($block), self.$block.is_some()),)*];
@@ -165,7 +165,9 @@ impl Naming {
     fn check(self, source: &Source, key: &str, name: Option<&str>) -> Result<(), SceneError> {
         let stops = |c: char| c.is_control() || "/\\[]".contains(c);
         match (self, name) {
-            (Self::Folders, None) => Err(source.error(key, "nothing", "a name: values and a folder have it")),
+            (Self::Folders, None) => {
+                Err(source.missing(key, "the values and the folder of a study have its name"))
+            }
             (Self::Folders, Some(name)) => check_name(source, key, name),
             (Self::Brackets, Some(name)) if name.contains(stops) => {
                 let allowed = "a name without `/`, `\\`, `[`, `]`: files and values have it";
@@ -293,7 +295,7 @@ pub trait Solved {
     /// Name.
     fn name(&self) -> &str;
 
-    /// A scalar and its unit.
+    /// Returns a scalar and its unit.
     fn scalar(&self, quantity: &str) -> Option<(f64, &str)>;
 
     /// Seconds of its solution; none if it has failed.
@@ -335,7 +337,7 @@ impl Comparisons<'_> {
         self.curves.iter().enumerate().try_for_each(|(index, spec)| spec.check(source, index, variants))
     }
 
-    /// Names of the scalars that they add to a report.
+    /// Returns names of the scalars that they add to a report.
     pub fn names(&self) -> impl Iterator<Item = Named> {
         let tables = self.convergence.iter().flat_map(|spec| [LIMIT, ORDER].map(|q| q.of(&[&spec.name])));
         let curves = self.curves.iter().flat_map(|spec| spec.studies.iter().map(|study| (&spec.name, study)));

@@ -162,7 +162,8 @@ pub fn main<C: Case, V: Subcommand>(own: impl FnOnce(V) -> Result<bool, Failure<
         .version(program.version)
         .about(program.about)
         .after_help(format!(
-            "Examples:\n{}\n\nExit codes: 0 done, 1 an expectation or the run failed, 2 bad input, 130 interrupted.",
+            "Examples:\n{}\n\n\
+             Exit codes: 0 done, 1 an expectation or the run failed, 2 bad input, 130 interrupted.",
             program.examples
         ));
     let matches = command.clone().get_matches();
@@ -177,7 +178,7 @@ pub fn main<C: Case, V: Subcommand>(own: impl FnOnce(V) -> Result<bool, Failure<
             .and_then(|source| run_shown::<C>(&source, &arguments, cli.verbose)),
         Command::Resume { output, checkpoints } => resume::<C>(&output, checkpoints.every(), cli.verbose),
         Command::Check { scene, quick, inputs } => check::<C>(&scene, quick, &inputs),
-        Command::Sweep(arguments) => sweep::<C>(*arguments),
+        Command::Sweep(arguments) => sweep::<C>(*arguments, cli.verbose),
         Command::View { output, html } => show::<C>(&output, html.as_deref()),
         Command::Own(command) => own(command),
         Command::Schema => {
@@ -287,7 +288,7 @@ fn show<C: Case>(output: &Path, html: Option<&Path>) -> Result<bool, Failure<C::
     Ok(true)
 }
 
-fn sweep<C: Case>(arguments: SweepArguments) -> Result<bool, Failure<C::Error>> {
+fn sweep<C: Case>(arguments: SweepArguments, verbose: bool) -> Result<bool, Failure<C::Error>> {
     let SweepArguments { scene, mut vary, sample, count, search, shard, merge, slurm, column, .. } =
         arguments;
     let output = &arguments.output.unwrap_or_else(|| {
@@ -319,11 +320,13 @@ fn sweep<C: Case>(arguments: SweepArguments) -> Result<bool, Failure<C::Error>> 
         None => super::sweep::<C>(source, &vary, &mut options)?,
     };
     bar.finish();
-    terminal::print(format_args!("{}results in {}\n", finished.text, output.display()));
+    let text = finished.table.as_ref().filter(|_| !verbose).unwrap_or(&finished.text);
+    terminal::print(format_args!("{text}results in {}\n", output.display()));
     Ok(finished.report.passed())
 }
 
-/// The command line of this process without `--slurm N` and `--threads N`, which its jobs do not take over.
+/// Returns the command line of this process without `--slurm N` and `--threads N`, which its jobs do not take
+/// over.
 fn without_slurm() -> Vec<String> {
     let program = std::env::current_exe().map(|path| path.display().to_string());
     let mut words = vec![program.unwrap_or_else(|_| "sweep".into())];

@@ -5,8 +5,8 @@ use polycore::file::prepare_directory;
 use std::fs::{self, File};
 use std::path::Path;
 
-/// The directory of a new run: as [`prepare_directory`], without what an earlier run left, which must not
-/// pass for this one's, and held against a second run.
+/// Returns the directory of a new run: as [`prepare_directory`], without what an earlier run left, which must
+/// not pass for this one's, and held against a second run.
 ///
 /// # Errors
 /// As [`prepare_directory`] and [`lock_run`].
@@ -21,7 +21,7 @@ pub fn prepare_run(directory: impl AsRef<Path>) -> Result<RunLock, Error> {
     Ok(lock)
 }
 
-/// The directory of a resumed run: without half-written files, and held against a second run.
+/// Returns the directory of a resumed run: without half-written files, and held against a second run.
 ///
 /// # Errors
 /// As [`lock_run`].

@@ -98,8 +98,8 @@ impl Input {
     }
 }
 
-/// The scenes that a scene names, whose results lie beside `output`, the folder of its own, or where `placed`
-/// says.
+/// Returns the scenes that a scene names, whose results lie beside `output`, the folder of its own, or where
+/// `placed` says.
 ///
 /// # Errors
 /// A scene that is missing or names no program; one that, by way of others, needs its own results.
@@ -218,7 +218,7 @@ impl InputArguments {
         self.inputs.iter().map(|placed| (placed.name.clone(), placed.output.clone())).collect()
     }
 
-    fn of(&self, source: &Source, output: &Path) -> Result<Vec<Input>, SceneError> {
+    fn list(&self, source: &Source, output: &Path) -> Result<Vec<Input>, SceneError> {
         inputs(source, output, &self.placed())
     }
 }
@@ -230,7 +230,7 @@ pub(super) fn describe(
     quick: bool,
     arguments: &InputArguments,
 ) -> Result<(), SceneError> {
-    let inputs = arguments.of(source, output)?;
+    let inputs = arguments.list(source, output)?;
     if !inputs.is_empty() {
         crate::say!("inputs");
     }
@@ -241,7 +241,8 @@ pub(super) fn describe(
     Ok(())
 }
 
-/// A scene with the results of its inputs; `with_inputs`: those that are not current are computed first.
+/// Returns a scene with the results of its inputs; `with_inputs`: those that are not current are computed
+/// first.
 ///
 /// # Errors
 /// Results that are missing or stale, with the command that computes them; an input that fails.
@@ -255,8 +256,8 @@ pub(super) fn attach<C: Case>(
     attached::<C::Error>(source, output, quick, &arguments.placed(), with_inputs)
 }
 
-/// A scene with the results of its inputs, which lie beside `output` or where `placed` says; `with_inputs`:
-/// those that are not current are computed first, by the programs beside this one.
+/// Returns a scene with the results of its inputs, which lie beside `output` or where `placed` says;
+/// `with_inputs`: those that are not current are computed first, by the programs beside this one.
 ///
 /// # Errors
 /// Results that are missing or stale, with the command that computes them; an input that fails.
@@ -339,7 +340,7 @@ fn continues(input: &Input, quick: bool) -> bool {
         })
 }
 
-/// The executable beside this one.
+/// Returns the executable beside this one.
 fn sibling(program: &str) -> Result<PathBuf, String> {
     let own = std::env::current_exe().map_err(|error| format!("no place of this program: {error}"))?;
     let path = own.with_file_name(program).with_extension(std::env::consts::EXE_EXTENSION);

@@ -81,7 +81,7 @@ pub trait Case {
         &[]
     }
 
-    /// The JSON Schema of its scenes.
+    /// Returns the JSON Schema of its scenes.
     fn schema() -> serde_json::Value;
 }
 
@@ -183,7 +183,7 @@ pub struct Options<'a> {
 }
 
 impl<'a> Options<'a> {
-    /// A new, whole run into a directory, which nobody watches.
+    /// Returns a new, whole run into a directory, which nobody watches.
     pub fn new(output: &'a Path) -> Self {
         Self {
             output,
@@ -255,7 +255,7 @@ pub(crate) struct VariantCheckpoint<'a> {
 }
 
 impl<'a> Run<'a> {
-    /// A run of a scene.
+    /// Returns a run of a scene.
     pub fn new(program: &'static Program, source: &Source, options: Options<'a>) -> Self {
         let header = Header::new(source, options.quick);
         Self {
@@ -271,7 +271,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// A run of one variant, into the checkpoint of this one.
+    /// Returns a run of one variant, into the checkpoint of this one.
     pub(crate) fn of_variant<'b>(&self, options: Options<'b>, kept: VariantCheckpoint<'b>) -> Run<'b> {
         Run { kept: Some(kept), ..Run::new(self.program, &self.source, options) }
     }
@@ -306,7 +306,8 @@ impl<'a> Run<'a> {
         match finished().or_else(begun).and_then(|path| file(&path)) {
             Some(other) if file(&self.source.path).is_some_and(|own| own != other) => {
                 let reason = format!(
-                    "it has the results of another scene, {}; choose another folder with --output, or remove this one",
+                    "it has the results of another scene, {}; choose another folder with --output, or \
+                     remove this one",
                     other.display()
                 );
                 Err(Error::OutputDirectory { path: directory.to_path_buf(), reason })
@@ -366,7 +367,7 @@ impl<'a> Run<'a> {
         if state.is_some() || since.elapsed() > PATIENCE { Err(self.interruption()) } else { Ok(()) }
     }
 
-    /// The error of a run that the user stopped.
+    /// Returns the error of a run that the user stopped.
     pub fn interruption(&self) -> Error {
         Error::Interrupted { program: self.program.name, output: self.options.output.to_path_buf() }
     }

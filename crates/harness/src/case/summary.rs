@@ -129,8 +129,8 @@ impl<'a> Names<'a> {
     }
 }
 
-/// Names of the values that matter: those that `[report]` lists, otherwise those of the first expectations,
-/// otherwise the main values of the program, otherwise the first.
+/// Returns names of the values that matter: those that `[report]` lists, otherwise those of the first
+/// expectations, otherwise the main values of the program, otherwise the first.
 pub(crate) fn main_names(report: &Report, listed: &[String], columns: &[&str]) -> Vec<String> {
     let names = Names::new(report);
     let mut found = names.fitting(listed.iter().map(String::as_str));
@@ -161,7 +161,7 @@ pub(crate) fn main_names(report: &Report, listed: &[String], columns: &[&str]) -
     found.into_iter().map(str::to_owned).collect()
 }
 
-/// The table of the main values: a row for each variant, then single values.
+/// Returns the table of the main values: a row for each variant, then single values.
 fn main_values(report: &Report, listed: &[String], columns: &[&str], width: usize) -> String {
     let names = Names::new(report);
     let shown = main_names(report, listed, columns);
@@ -231,11 +231,11 @@ fn verdict(report: &Report, style: &TerminalStyle) -> String {
     let mut text = String::new();
     if all > 0 {
         let count = |kind: Kind| report.expect.iter().filter(|one| one.expect.kind == kind).count();
-        let kinds = Kind::ALL.map(|kind| (count(kind), kind.words())).into_iter().filter(|own| own.0 > 0);
+        let kinds = Kind::ALL.map(|kind| (count(kind), kind.name())).into_iter().filter(|own| own.0 > 0);
         let kinds: Vec<String> = kinds.map(|(count, kind)| format!("{count} {kind}")).collect();
         let line = format!("{met} of {all} expectations met");
         let line = if met == all { style.green(&line) } else { style.red(&line) };
-        text += &format!("{line}: {}\n", kinds.join(", "));
+        text += &format!("{line} ({})\n", kinds.join(", "));
     } else if report.passed() {
         text += "no expectations: the scene has no [[expect]]\n";
     }
@@ -280,7 +280,7 @@ fn files(output: &Path, style: &TerminalStyle) -> String {
     text + &format!("next: {} view {}   # one page with all of it\n", invocation(), output.display())
 }
 
-/// The words with which this program was called, without its arguments.
+/// Returns the words with which this program was called, without its arguments.
 fn invocation() -> String {
     let called = std::env::args().next().unwrap_or_default();
     let name = Path::new(&called).file_stem().map(|name| name.to_string_lossy().into_owned());
@@ -327,7 +327,7 @@ mod tests {
         assert!(rows[4].starts_with("balance  1"), "{table}");
         let listed = main_values(&report, &["error".to_owned()], &[], 100);
         assert!(listed.starts_with("variant  error\n") && !listed.contains("balance"), "{listed}");
-        assert!(verdict(&report, &TerminalStyle::plain()).starts_with("3 of 3 expectations met: 3 bounds"));
+        assert!(verdict(&report, &TerminalStyle::plain()).starts_with("3 of 3 expectations met (3 bound)"));
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Many runs of one scene over a grid of values: in parallel, one thread each; finished ones are kept.
 
 use super::rows::{Row, Rows};
+use super::terminal::WIDTH;
 use super::{Case, Fault, Finished, Options, Program};
 use crate::report::{Phases, Report};
 use crate::scene::{Failure, Source};
@@ -143,7 +144,8 @@ pub fn sweep<C: Case>(
     options: &mut SweepOptions,
 ) -> Result<Finished, Failure<C::Error>> {
     let (rows, bands, report) = rows::<C>(source, vary, options)?;
-    Ok(Finished::new(report, rows.text() + &bands))
+    let table = rows.short_text(WIDTH) + &bands;
+    Ok(Finished { table: Some(table), ..Finished::new(report, rows.text() + &bands) })
 }
 
 /// [`sweep`], and its rows: those requested first, in their order. And the bands of what was sampled.
@@ -155,7 +157,7 @@ fn rows<C: Case>(
     let mut runs = runs::<C>(source, vary, options.quick)?;
     if let Part::Shard(shard) = options.part {
         let mut numbers = 0..runs.len();
-        runs.retain(|_| numbers.next().is_some_and(|number| shard.has(number)));
+        runs.retain(|_| numbers.next().is_some_and(|number| shard.contains(number)));
         polycore::file::prepare_directory(options.output)?;
         let _lock = crate::case::share_run(options.output)?;
         let rows = rows_of(&C::PROGRAM, &runs, solve::<C>(&runs, options)?, vary, options);
@@ -167,8 +169,8 @@ fn rows<C: Case>(
         && let Some((number, run)) = (1..).zip(&runs).find(|(_, run)| run.finished(options.output).is_none())
     {
         let reason = format!(
-            "found run {number} of {}, {}, unfinished or of another scene; allowed: finished runs, of `--shard 1/N` to \
-             `--shard N/N` into {}",
+            "found run {number} of {}, {}, unfinished or of another scene; allowed: finished runs, of \
+             `--shard 1/N` to `--shard N/N` into {}",
             runs.len(),
             run.name,
             options.output.display()
@@ -253,7 +255,7 @@ fn former(vary: &[Vary], output: &Path) -> Result<Vec<Vec<String>>, Error> {
     Err(Error::Option { option: format!("--output {}", output.display()), reason })
 }
 
-/// The runs of a grid, each checked.
+/// Returns the runs of a grid, each checked.
 fn runs<C: Case>(source: &Source, vary: &[Vary], quick: bool) -> Result<Vec<Run>, Failure<C::Error>> {
     let keys: Vec<String> = vary.iter().flat_map(Vary::keys).collect();
     if let Some(twice) = (1..keys.len()).find(|&k| keys[..k].contains(&keys[k])) {
@@ -324,7 +326,10 @@ fn solve<C: Case>(
         }
     });
     let (outcomes, _) = finished.into_inner().unwrap_or_else(PoisonError::into_inner);
-    let stopped = |outcome: &Result<Report, Failure<C::Error>>| matches!(outcome, Err(Failure::Run(error)) if error.is_interruption());
+    let stopped = |outcome: &Result<Report, Failure<C::Error>>| match outcome {
+        Err(Failure::Run(error)) => error.is_interruption(),
+        _ => false,
+    };
     if outcomes.len() < runs.len() || outcomes.values().any(stopped) {
         return Err(Error::SweepInterrupted(output.to_path_buf()).into());
     }

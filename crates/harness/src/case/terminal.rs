@@ -45,7 +45,7 @@ pub fn complain(text: impl Display) {
 }
 
 /// Longest line of a summary, in columns.
-const WIDTH: usize = 100;
+pub(super) const WIDTH: usize = 100;
 
 /// Colours and width of standard output.
 #[derive(Clone, Copy, Debug)]
@@ -125,7 +125,7 @@ impl TerminalStyle {
     }
 }
 
-/// The exit code of a command that tells whether it passed; a failure is printed.
+/// Returns the exit code of a command that tells whether it passed; a failure is printed.
 pub fn exit<E: Fault>(result: Result<bool, Failure<E>>) -> ExitCode {
     match result {
         Ok(true) if !CUT_SHORT.load(Ordering::Relaxed) => ExitCode::SUCCESS,
@@ -160,7 +160,8 @@ pub fn is_finished(output: &Path) -> bool {
     finished
 }
 
-/// A command line on which negative numbers are values and no options: the range of each is then told.
+/// Returns a command line on which negative numbers are values and no options: the range of each is then
+/// told.
 pub(super) fn with_negative_numbers(command: clap::Command) -> clap::Command {
     let takes = |arg: clap::Arg| match arg.get_action().takes_values() {
         true => arg.allow_negative_numbers(true),
@@ -169,7 +170,7 @@ pub(super) fn with_negative_numbers(command: clap::Command) -> clap::Command {
     command.mut_args(takes).mut_subcommands(with_negative_numbers)
 }
 
-/// A time in seconds, for clap.
+/// Parses a time in seconds, for clap.
 ///
 /// # Errors
 /// The text is not a number, or none of 0 to 1e9.

@@ -6,13 +6,13 @@ use polycore::Error;
 use polycore::file::atomic_write;
 
 /// A column: name, unit (empty if dimensionless), numbers.
-pub type CsvColumn<'a> = (&'a str, &'a str, &'a [f64]);
+pub type Column<'a> = (&'a str, &'a str, &'a [f64]);
 
 /// Writes columns of equal length, whole or not at all.
 ///
 /// # Errors
 /// [`Error::Data`] if the lengths differ, [`Error::Io`] if writing fails.
-pub fn write(path: impl AsRef<Path>, columns: &[CsvColumn<'_>]) -> Result<(), Error> {
+pub fn write(path: impl AsRef<Path>, columns: &[Column<'_>]) -> Result<(), Error> {
     // `{:?}` is the shortest text that reads back to the same f64
     write_cells(path.as_ref(), columns, |number| format!("{number:?}"))
 }
@@ -21,12 +21,12 @@ pub fn write(path: impl AsRef<Path>, columns: &[CsvColumn<'_>]) -> Result<(), Er
 ///
 /// # Errors
 /// As [`write()`].
-pub fn write_with_gaps(path: impl AsRef<Path>, columns: &[CsvColumn<'_>]) -> Result<(), Error> {
+pub fn write_with_gaps(path: impl AsRef<Path>, columns: &[Column<'_>]) -> Result<(), Error> {
     let cell = |number: f64| if number.is_nan() { String::new() } else { format!("{number:?}") };
     write_cells(path.as_ref(), columns, cell)
 }
 
-fn write_cells(path: &Path, columns: &[CsvColumn<'_>], cell: impl Fn(f64) -> String) -> Result<(), Error> {
+fn write_cells(path: &Path, columns: &[Column<'_>], cell: impl Fn(f64) -> String) -> Result<(), Error> {
     let rows = columns.first().map_or(0, |(_, _, data)| data.len());
     if let Some((name, _, data)) = columns.iter().find(|(_, _, data)| data.len() != rows) {
         let reason = format!("{} rows, but the first column has {rows}", data.len());
@@ -69,7 +69,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<Vec<(String, Vec<f64>)>, Error> {
     Ok(columns)
 }
 
-/// The error of the system inside: its kind says whether there is room on the disk.
+/// Returns the error of the system inside: its kind says whether there is room on the disk.
 fn plain(error: csv::Error) -> std::io::Error {
     match error.into_kind() {
         csv::ErrorKind::Io(error) => error,

@@ -98,8 +98,8 @@ impl<const D: usize> LatticeCells<'_, D> {
         half
     }
 
-    /// A corner of a cell, the mean over the connected cells around it, so that they share the corner: bit d
-    /// of `corner` is its end along axis d.
+    /// Returns a corner of a cell, the mean over the connected cells around it, so that they share the
+    /// corner: bit d of `corner` is its end along axis d.
     pub fn corner(&self, particle: usize, corner: u8) -> [f64; D] {
         // bit d of a place: the other side of the corner along axis d
         let side = |place: usize, d: usize| 2 * d + (usize::from(corner) ^ place) / (1 << d) % 2;

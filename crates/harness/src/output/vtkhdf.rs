@@ -56,14 +56,14 @@ struct Layout {
 
 impl Layout {
     /// Checks arrays against the number of points and cells.
-    fn of(counts: [usize; 2], point_data: &[Data<'_>], cell_data: &[Data<'_>]) -> Result<Self, Error> {
+    fn from_data(counts: [usize; 2], point_data: &[Data<'_>], cell_data: &[Data<'_>]) -> Result<Self, Error> {
         let arrays = named("point", counts[0], point_data)?;
         let cell_arrays = named("cell", counts[1], cell_data)?;
         Ok(Self { points: counts[0], arrays, cells: counts[1], cell_arrays, moments: Vec::new() })
     }
 }
 
-/// Names and numbers of components of arrays on `count` points or cells.
+/// Returns names and numbers of components of arrays on `count` points or cells.
 fn named(kind: &str, count: usize, data: &[Data<'_>]) -> Result<Vec<(String, usize)>, Error> {
     let mut arrays: Vec<(String, usize)> = Vec::new();
     for &(name, components, values) in data {

@@ -13,9 +13,9 @@ use polycore::units::Ratio;
 ///
 /// ```toml
 /// [[expect]]
-/// quantity = "stress_concentration"   # the name of a scalar of the report, or a quotient of two: "NAME / NAME"
+/// quantity = "stress_concentration"   # a scalar of the report, or a quotient of two: "NAME / NAME"
 /// reference = 3.0
-/// tolerance = "1 %"                   # of |reference|; or a plain number, absolute, in the unit of the value
+/// tolerance = "1 %"                   # of |reference|; or a number in the unit of the value
 /// kind = "closed-form"                # what kind of evidence the figure is: see [`Kind`]
 /// source = "Kirsch (1898), infinite plate"
 /// quick = false                       # optional: not judged in --quick runs
@@ -68,15 +68,15 @@ impl Kind {
         Self::Regression,
     ];
 
-    /// Returns its name in running text, in the plural.
-    pub fn words(self) -> &'static str {
+    /// Returns its name in scenes.
+    pub fn name(self) -> &'static str {
         match self {
-            Self::ClosedForm => "closed forms",
-            Self::Published => "published figures",
-            Self::IndependentProgram => "figures of independent programs",
+            Self::ClosedForm => "closed-form",
+            Self::Published => "published",
+            Self::IndependentProgram => "independent-program",
             Self::Convergence => "convergence",
-            Self::Bound => "bounds",
-            Self::Regression => "earlier figures",
+            Self::Bound => "bound",
+            Self::Regression => "regression",
         }
     }
 
@@ -128,7 +128,7 @@ pub enum Tolerance {
 }
 
 impl Tolerance {
-    /// The accepted distance from `reference`.
+    /// Returns the accepted distance from `reference`.
     pub fn distance(self, reference: f64) -> f64 {
         match self {
             Self::Relative(share) => share * reference.abs(),
@@ -268,7 +268,7 @@ impl TryFrom<Written> for Expect {
             }
             _ => {
                 return Err(format!(
-                    "expectation of `{quantity}`: give either `reference` and `tolerance`, or `at_least` and/or `at_most`"
+                    "expectation of `{quantity}`: give `reference` and `tolerance`, or `at_least`, `at_most` or both"
                 ));
             }
         };
@@ -288,7 +288,7 @@ impl From<Expect> for Written {
 }
 
 impl Expect {
-    /// The scalars that it needs: one name, or the two of a quotient.
+    /// Returns the scalars that it needs: one name, or the two of a quotient.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.quantity.split(QUOTIENT)
     }
@@ -346,7 +346,7 @@ pub struct Judgement {
 }
 
 impl Judgement {
-    /// A row of a table: verdict, quantity, value, requirement, source.
+    /// Returns a row of a table: verdict, quantity, value, requirement, source.
     pub fn row(&self) -> [String; 5] {
         let verdict = if self.pass { "pass" } else { "FAIL" };
         let value = match (&self.message, self.value) {

@@ -113,7 +113,7 @@ impl Git {
     }
 }
 
-/// The commit checked out in `root`, and the file whose modification tells when it was.
+/// Returns the commit checked out in `root`, and the file whose modification tells when it was.
 fn head(root: &Path) -> Option<(String, PathBuf)> {
     let mut directory = root.join(".git");
     if directory.is_file() {

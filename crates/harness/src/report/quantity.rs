@@ -50,7 +50,7 @@ impl Named {
         Self { name: name.into(), unit: unit.into() }
     }
 
-    /// Names with their units, in a line.
+    /// Returns names with their units, in a line.
     pub fn list<'a>(all: impl IntoIterator<Item = &'a Self>) -> String {
         let one = |Self { name, unit }: &Self| match unit.as_str() {
             "" => name.clone(),

@@ -77,7 +77,8 @@ impl SceneUnits {
         let used = choices.iter().filter(|own| count(own.0) > 0).max_by_key(|own| count(own.0));
         let readable =
             |own: &&(&'static str, f64)| largest == 0.0 || READABLE.contains(&(largest.abs() * own.1));
-        let large = |own: &&(&str, f64)| largest.abs() * own.1 >= 0.1 && own.0 != "cm";
+        // units that only their users expect
+        let large = |own: &&(&str, f64)| largest.abs() * own.1 >= 0.1 && !["cm", "min", "h"].contains(&own.0);
         let (name, factor) =
             used.filter(readable).or_else(|| choices.iter().find(large)).or(choices.last()).copied()?;
         Some(ShownUnit { name, factor })
@@ -98,7 +99,8 @@ mod tests {
 
     #[test]
     fn units_of_the_scene_come_first() {
-        let scene = "# a plate's\nspacing = \"2 mm\"\nmin = [\"-5e1 mm\", \"1 m\"]\nstress = \"1 kPa\"\ntime = \"3 min\"\nname = \"e\"";
+        let scene = "# a plate's\nspacing = \"2 mm\"\nmin = [\"-5e1 mm\", \"1 m\"]\n\
+                     stress = \"1 kPa\"\ntime = \"3 min\"\nname = \"e\"";
         let units = SceneUnits::from_scene(scene);
         let close = |(value, unit): (f64, String), expected: f64, name: &str| {
             assert!((value - expected).abs() < 1e-12 * expected.abs() && unit == name, "{value} {unit}");

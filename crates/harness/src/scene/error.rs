@@ -44,28 +44,29 @@ const MOST_SHOWN: usize = 12;
 const LONGEST_LINE: usize = 2000;
 
 impl SceneError {
-    /// The whole message in one line, without the picture of the source.
+    /// Returns the whole message in one line, without the picture of the source.
     pub fn message(&self) -> &str {
         &self.0.message
     }
 
-    /// The dotted path of the key the error is about.
+    /// Returns the dotted path of the key the error is about.
     pub fn key(&self) -> Option<&str> {
         self.0.key.as_deref()
     }
 
-    /// The line, counted from 1.
+    /// Returns the line, counted from 1.
     pub fn line(&self) -> Option<usize> {
         self.0.place.as_ref().map(|place| place.line)
     }
 
-    /// The exit code for bad input.
+    /// Returns the exit code for bad input.
     pub fn exit_code(&self) -> u8 {
         EXIT_BAD_INPUT
     }
 
-    /// The message with the lines of the source it is about, as the command lines print it: one message line,
-    /// never wrapped, so that it can be searched for; in colours if standard error is a terminal.
+    /// Returns the message with the lines of the source it is about, as the command lines print it: one
+    /// message line, never wrapped, so that it can be searched for; in colours if standard error is a
+    /// terminal.
     pub fn render(&self) -> String {
         self.render_with(std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none())
     }
@@ -151,7 +152,9 @@ impl SceneError {
             format!("missing `version`; allowed: `version = {VERSION}`{}", suggestion.unwrap_or_default());
         let span = similar.map_or(0..0, |(_, span)| span);
         let help = Some(format!("begin the file with `version = {VERSION}`"));
-        Self::from_span(source, "scene::version", Some("version".into()), span, message).label("here").help(help)
+        Self::from_span(source, "scene::version", Some("version".into()), span, message)
+            .label("here")
+            .help(help)
     }
 
     pub(super) fn bad_version(source: &Source, span: Range<usize>) -> Self {
@@ -292,7 +295,8 @@ fn advice(name: &str) -> Option<&'static str> {
         "reducedpolynomial" => "the reduced polynomial of third order is `yeoh` here",
         "prony" | "viscoelastic" => "rates and relaxation are not modelled: laws are elastic",
         "poissonratio" | "poissonsratio" => {
-            "Poisson's ratio follows from `bulk_modulus` and the shear modulus, ν = (3K − 2G)/(6K + 2G), or from the law"
+            "Poisson's ratio follows from `bulk_modulus` and the shear modulus, ν = (3K − 2G)/(6K + 2G), or \
+             from the law"
         }
         _ => return None,
     })
@@ -326,7 +330,7 @@ impl Diagnostic for SceneError {
     }
 }
 
-/// The candidate that `name` most likely stands for.
+/// Returns the candidate that `name` most likely stands for.
 pub(super) fn nearest<'a>(name: &str, candidates: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     let lower = name.to_lowercase();
     let scored = candidates
@@ -354,7 +358,7 @@ pub(super) fn scene_inside(directory: &Path) -> Option<String> {
     case.is_file().then(|| format!("did you mean {}?", case.display()))
 }
 
-/// The words between backticks.
+/// Returns the words between backticks.
 fn quoted(message: &str) -> Vec<&str> {
     message.split('`').skip(1).step_by(2).collect()
 }

@@ -70,7 +70,7 @@ impl Stamp {
         hash(text.as_bytes())
     }
 
-    /// The identity of the results in a folder, if they are finished.
+    /// Returns the identity of the results in a folder, if they are finished.
     pub fn identity_of(output: &Path) -> Option<String> {
         let provenance = Report::read(output.join(FILE_NAME)).ok()?.provenance;
         Some(provenance.stamp?.identity(&provenance.program, &provenance.version))
@@ -78,13 +78,13 @@ impl Stamp {
 }
 
 impl Source {
-    /// The folder of the scene, from which the paths in it count.
+    /// Returns the folder of the scene, from which the paths in it count.
     pub fn folder(&self) -> &Path {
         self.path.parent().unwrap_or(Path::new(""))
     }
 
-    /// The path of a file that the scene names. It is noted with the hash of its contents: results are stale
-    /// when that changes.
+    /// Returns the path of a file that the scene names. It is noted with the hash of its contents: results
+    /// are stale when that changes.
     pub fn file(&self, name: impl AsRef<Path>) -> PathBuf {
         let (path, key) = (self.folder().join(&name), name.as_ref().to_path_buf());
         let mut notes = self.files.lock().unwrap_or_else(PoisonError::into_inner);
@@ -104,7 +104,7 @@ impl Source {
         Stamp { scene: hash(self.text.as_bytes()), quick, files, inputs: (*self.inputs).clone() }
     }
 
-    /// The same scene with the results of its inputs.
+    /// Returns the same scene with the results of its inputs.
     #[must_use]
     pub fn with_inputs(mut self, inputs: BTreeMap<String, InputStamp>) -> Self {
         self.inputs = Arc::new(inputs);
@@ -117,7 +117,7 @@ impl Source {
         Self { inputs: Arc::clone(&self.inputs), ..Self::new(&self.path, text) }
     }
 
-    /// The folder of the results of an input, named at `key`.
+    /// Returns the folder of the results of an input, named at `key`.
     ///
     /// # Errors
     /// No input has that name.
@@ -135,7 +135,7 @@ impl Source {
         }
     }
 
-    /// The scenes named in `[inputs]`: names, and paths as they are written.
+    /// Returns the scenes named in `[inputs]`: names, and paths as they are written.
     ///
     /// # Errors
     /// A syntax error; an entry that is no path.
@@ -162,7 +162,7 @@ impl Source {
         Ok(named)
     }
 
-    /// The program that the scene names.
+    /// Returns the program that the scene names.
     pub fn program(&self) -> Option<String> {
         let root = DeTable::parse(&self.text).ok()?;
         Some(root.get_ref().get("program")?.get_ref().as_str()?.to_owned())

@@ -8,14 +8,15 @@ use toml::de::{DeString, DeTable, DeValue};
 type Key<'i> = Spanned<DeString<'i>>;
 type TreeValue<'i> = Spanned<DeValue<'i>>;
 
-/// The span of the value at `path` (`a.b[2].c`), or of its nearest existing parent other than the root.
+/// Returns the span of the value at `path` (`a.b[2].c`), or of its nearest existing parent other than the
+/// root.
 pub(super) fn span(root: &DeTable<'_>, path: &str) -> Option<Range<usize>> {
     let mut found = None;
     walk(root, path, &mut |value| found = Some(value.span()));
     found
 }
 
-/// The value at `path`.
+/// Returns the value at `path`.
 pub(super) fn value<'t, 'i>(root: &'t DeTable<'i>, path: &str) -> Option<&'t TreeValue<'i>> {
     let mut last = None;
     walk(root, path, &mut |value| last = Some(value)).then_some(last).flatten()
@@ -55,7 +56,7 @@ fn without_indices(part: &str) -> &str {
     }
 }
 
-/// The path of the innermost key or value around `place`.
+/// Returns the path of the innermost key or value around `place`.
 pub(super) fn path(root: &DeTable<'_>, place: &Range<usize>) -> Option<String> {
     // what is missing from the file as a whole has no place, not the first key's
     if place.is_empty() {
@@ -72,7 +73,7 @@ pub(super) fn path(root: &DeTable<'_>, place: &Range<usize>) -> Option<String> {
     found
 }
 
-/// The span of a key called `name`, preferably directly in the table at `parent`.
+/// Returns the span of a key called `name`, preferably directly in the table at `parent`.
 pub(super) fn key(root: &DeTable<'_>, parent: &str, name: &str) -> Option<(String, Range<usize>)> {
     let mut found: Option<(String, Range<usize>)> = None;
     visit(root, "", &mut |path, key, _| {

@@ -18,8 +18,8 @@ pub(super) enum Overlay {
 }
 
 impl Source {
-    /// The same scene where the value of `key` is the one written at `by`: [`Source::parse`] finds it there,
-    /// and errors about the first point at the second. Of several that concern a key the first holds.
+    /// Returns the same scene where the value of `key` is the one written at `by`: [`Source::parse`] finds it
+    /// there, and errors about the first point at the second. Of several that concern a key the first holds.
     #[must_use]
     pub fn with_replaced(&self, key: &str, by: &str) -> Self {
         let mut source = self.clone();
@@ -27,8 +27,8 @@ impl Source {
         source
     }
 
-    /// The same scene with the table at `by` over it. Its keys are paths (`"boundary[1].film"`, or nested
-    /// tables); tables are merged, all else is replaced, and what is not there yet is added.
+    /// Returns the same scene with the table at `by` over it. Its keys are paths (`"boundary[1].film"`, or
+    /// nested tables); tables are merged, all else is replaced, and what is not there yet is added.
     #[must_use]
     pub fn with_merged(&self, by: &str) -> Self {
         let mut source = self.clone();
@@ -70,7 +70,7 @@ impl Source {
         Ok(())
     }
 
-    /// The key in the text that holds what stands at `key`.
+    /// Returns the key in the text that holds what stands at `key`.
     pub(super) fn origin(&self, root: &DeTable<'_>, key: &str) -> Option<String> {
         let sweep = Overlay::Merge { by: format!("{SWEEP}.set") };
         std::iter::once(&sweep).chain(&self.overlays).find_map(|overlay| match overlay {

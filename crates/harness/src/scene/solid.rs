@@ -54,7 +54,7 @@ impl SolidSpec {
         Ok(())
     }
 
-    /// The viewer.
+    /// Returns the viewer.
     pub fn view(&self) -> View {
         let View { azimuth, elevation } = View::default();
         View {

@@ -53,7 +53,7 @@ impl ErrorAgainstTime {
         }
         let count = self.quantities.len();
         match (&self.truth, &self.values) {
-            _ if count == 0 => fault("quantities", "nothing".to_owned(), "at least one"),
+            _ if count == 0 => fault("quantities", "an empty list".to_owned(), "at least one"),
             (Some(name), None) if known(&name) => fault("truth", format!("`{name}`"), "the name of a study"),
             (None, Some(values)) if values.len() != count => {
                 let allowed = format!("one for each of the {count} quantities");

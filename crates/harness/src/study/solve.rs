@@ -5,7 +5,7 @@
 //! own any more. A variant's numbers do not depend on the threads, so neither do those of a scene.
 
 use super::Naming;
-use crate::case::{Fault, VariantCheckpoint, Options, Run, Step};
+use crate::case::{Fault, Options, Run, Step, VariantCheckpoint};
 use crate::scene::Failure;
 use polycore::Error;
 use serde::Serialize;
@@ -127,7 +127,7 @@ where
     }
 }
 
-/// The text of an error that the scene expects, a part of which is `text`, in place of the outcome.
+/// Returns the text of an error that the scene expects, a part of which is `text`, in place of the outcome.
 ///
 /// # Errors
 /// Any other.

@@ -90,7 +90,12 @@ impl PageBody {
     ///
     /// # Errors
     /// [`Error::Format`] for damaged data; [`Error::Data`] where nothing can be drawn.
-    pub fn new(frames: &FrameReader, name: String, bridge: f64, detail: Detail) -> Result<(Self, Store), Error> {
+    pub fn new(
+        frames: &FrameReader,
+        name: String,
+        bridge: f64,
+        detail: Detail,
+    ) -> Result<(Self, Store), Error> {
         let steps = chosen(frames.len(), detail.steps);
         let mut notes = Vec::new();
         if steps.len() < frames.len() {
@@ -114,9 +119,13 @@ impl PageBody {
         let cells = groups(&solid, &mut store);
         let fields = fields(frames, &steps, &solid, plane, &mut store, &mut notes)?;
         let frame = |&step: &usize| {
-            frames.at(step, |series, step| {
+            frames.read_step(step, |series, step| {
                 let of = |name: &str| series.moment(step, name).filter(|x| x.is_finite());
-                Ok(PageFrame { time: series.times()[step], displacement: of("displacement"), load: of("load") })
+                Ok(PageFrame {
+                    time: series.times()[step],
+                    displacement: of("displacement"),
+                    load: of("load"),
+                })
             })
         };
         let times = steps.iter().map(frame).collect::<Result<_, _>>()?;
@@ -149,7 +158,7 @@ fn chosen(count: usize, most: usize) -> Vec<usize> {
     }
 }
 
-/// The particles of a file as cells.
+/// Returns the particles of a file as cells.
 fn particles(
     frames: &FrameReader,
     steps: &[usize],
@@ -158,7 +167,7 @@ fn particles(
     notes: &mut Vec<String>,
 ) -> Result<(PageSolid, bool), Error> {
     let displaced = frames.arrays()[0].iter().any(|(name, n)| name == DISPLACEMENT[0] && *n == 3);
-    let reference = frames.at(0, |series, step| {
+    let reference = frames.read_step(0, |series, step| {
         let mut points = series.points(step)?;
         if displaced {
             let moved = series.data(step, DISPLACEMENT[0])?;
@@ -166,25 +175,26 @@ fn particles(
         }
         Ok(points)
     })?;
-    let choice = ParticleChoice::of(&reference, detail.coarser);
+    let choice = ParticleChoice::from_positions(&reference, detail.coarser);
     if choice.kept.len() < reference.len() {
         notes.push(format!("{} cells for {} particles", choice.kept.len(), reference.len()));
     }
     let keep =
         |all: Vec<[f64; 3]>| -> Vec<[f64; 3]> { choice.kept.iter().map(|&k| all[k as usize]).collect() };
-    let positions = steps.iter().map(|&step| frames.at(step, |series, step| Ok(keep(series.points(step)?))));
+    let positions =
+        steps.iter().map(|&step| frames.read_step(step, |series, step| Ok(keep(series.points(step)?))));
     let positions = positions.collect::<Result<Vec<_>, Error>>()?;
     Ok((choice.solid(&keep(reference), &positions, bridge).by_kind(), choice.plane))
 }
 
-/// The mesh of a file.
+/// Returns the mesh of a file.
 fn mesh(
     frames: &FrameReader,
     steps: &[usize],
     detail: Detail,
     notes: &mut Vec<String>,
 ) -> Result<(PageSolid, bool), Error> {
-    let (points, cells) = (frames.at(0, |series, _| series.points(0))?, frames.cells()?);
+    let (points, cells) = (frames.read_step(0, |series, _| series.points(0))?, frames.cells()?);
     let mut solid = PageSolid::mesh(&points, &cells, detail.coarser).by_kind();
     let drawn: std::collections::HashSet<u32> = solid.cell_of.iter().copied().collect();
     if solid.points.len() < points.len() && drawn.len() < cells.len() {
@@ -193,7 +203,7 @@ fn mesh(
     let names = &frames.arrays()[0];
     if let Some((name, _)) = names.iter().find(|(name, n)| DISPLACEMENT.contains(&name.as_str()) && *n == 3) {
         for &step in steps {
-            let all = frames.at(step, |series, step| series.data(step, name))?;
+            let all = frames.read_step(step, |series, step| series.data(step, name))?;
             // what does not exist yet has not moved
             let known = |x: f64| if x.is_finite() { x } else { 0.0 };
             let of = |&point: &u32| [0, 1, 2].map(|d| known(all[3 * point as usize + d]));
@@ -213,14 +223,14 @@ fn moves(solid: &PageSolid, store: &mut Store) -> Option<PageMoves> {
     Some(PageMoves { slots, levels })
 }
 
-/// The first of the steps at which each cell exists.
+/// Returns the first of the steps at which each cell exists.
 fn births(frames: &FrameReader, steps: &[usize], solid: &PageSolid) -> Result<Option<Vec<u16>>, Error> {
     if !frames.arrays()[1].iter().any(|(name, n)| name == EXISTS && *n == 1) {
         return Ok(None);
     }
     let mut births = vec![NOTHING; solid.cell_of.len()];
     for (index, &step) in steps.iter().enumerate() {
-        let exists = frames.at(step, |series, step| series.cell_data(step, EXISTS))?;
+        let exists = frames.read_step(step, |series, step| series.cell_data(step, EXISTS))?;
         for (birth, &cell) in births.iter_mut().zip(&solid.cell_of) {
             if *birth == NOTHING && exists[cell as usize] > 0.5 {
                 *birth = index as u16;
@@ -282,7 +292,7 @@ fn fields(
         let places = if cells { &solid.cell_of } else { &solid.point_of };
         let mut rows: Vec<Vec<f64>> = Vec::new();
         for &step in steps {
-            let all = frames.at(step, |series, step| match of_cells {
+            let all = frames.read_step(step, |series, step| match of_cells {
                 true => series.cell_data(step, array),
                 false => series.data(step, array),
             })?;

@@ -19,7 +19,7 @@ pub struct FrameReader {
 }
 
 impl FrameReader {
-    /// All field files of a folder by name, those of an unfinished run included.
+    /// Returns all field files of a folder by name, those of an unfinished run included.
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Format`] for a damaged file.
@@ -67,7 +67,7 @@ impl FrameReader {
         [self.first.arrays(), self.first.cell_arrays()]
     }
 
-    /// The cells of a mesh.
+    /// Returns the cells of a mesh.
     ///
     /// # Errors
     /// [`Error::Format`].
@@ -79,7 +79,7 @@ impl FrameReader {
     ///
     /// # Errors
     /// Those of reading a damaged file.
-    pub fn at<T>(
+    pub fn read_step<T>(
         &self,
         step: usize,
         read: impl FnOnce(&Series, usize) -> Result<T, Error>,

@@ -15,7 +15,7 @@ use crate::case::{Names, main_names, natural};
 use crate::checkpoint;
 use crate::report::{self, Report, SceneUnits, Value};
 use crate::scene::Source;
-use body::{PageBody, Detail};
+use body::{Detail, PageBody};
 use frames::FrameReader;
 use polycore::Error;
 use polycore::file::atomic_write;
@@ -57,7 +57,7 @@ struct Found {
     tables: PageTables,
 }
 
-/// The page of a run in a folder, as HTML.
+/// Returns the page of a run in a folder, as HTML.
 ///
 /// # Errors
 /// [`Error::OutputDirectory`] for a folder without any result; [`Error::Io`], [`Error::Format`] for files
@@ -155,7 +155,8 @@ impl Found {
             let bridge = self.bridge(&frames.name);
             let mut detail = Detail { steps: STEPS, coarser: 1 };
             loop {
-                let (body, store) = PageBody::new(frames, format!("{prefix}{}", frames.name), bridge, detail)?;
+                let (body, store) =
+                    PageBody::new(frames, format!("{prefix}{}", frames.name), bridge, detail)?;
                 let text = store.text();
                 let least = detail.coarser >= COARSEST && detail.steps <= 2;
                 if text.len() <= share || least {
@@ -282,8 +283,11 @@ fn page(name: &str, found: Found) -> Result<String, Error> {
         }
         judged.extend(report.expect.iter().map(|judgement| {
             let [_, quantity, value, bound, source] = judgement.row();
-            let (pass, kind) = (judgement.pass, judgement.expect.kind.words());
-            json!({ "quantity": quantity, "pass": pass, "value": value, "bound": bound, "kind": kind, "source": source })
+            let (pass, kind) = (judgement.pass, judgement.expect.kind);
+            json!({
+                "quantity": quantity, "pass": pass, "value": value, "bound": bound, "kind": kind,
+                "source": source,
+            })
         }));
         let provenance = &report.provenance;
         header = json!({

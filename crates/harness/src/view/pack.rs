@@ -44,7 +44,7 @@ impl LevelRange {
         (low <= high).then_some(Self { low, step })
     }
 
-    /// The level next to a number; [`NOTHING`] for one that is not finite.
+    /// Returns the level next to a number; [`NOTHING`] for one that is not finite.
     pub fn level(&self, number: f64) -> u16 {
         match number.is_finite() {
             true if self.step > 0.0 => (number / self.step - self.low / self.step).round() as u16,

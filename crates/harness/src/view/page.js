@@ -48,8 +48,9 @@ function header() {
     details.append(make("summary", "What this page leaves out"), make("p", run.left_out.join("; ")));
     at("notes").append(details);
   }
-  if (!run.bodies.length && run.tables.length) {
-    at("notes").append(make("p", "The run has written no fields: in a scene, `[output] fields = true`."));
+  if (!run.bodies.length) {
+    const missing = run.tables.length ? "no fields (in a scene, `[output] fields` asks for them)" : "no fields and no tables";
+    at("notes").append(make("p", `The run has written ${missing}.`));
   }
 }
 
@@ -110,7 +111,7 @@ function tables() {
   at("judged-title").textContent = `Expectations (${run.expect.length})`;
   at("only-failed").closest("label").hidden = !failed;
   searched("expect", at("find-expect"), run.expect.map((e) =>
-    row([e.pass ? "met" : "not met", e.quantity, e.value, e.bound, e.kind, e.source], !e.pass)),
+    row([e.pass ? "met" : "not met", e.quantity, e.value, e.bound, e.kind.replace("-", " "), e.source], !e.pass)),
   [["", ""], ["quantity"], ["value", "number"], ["expected", "number"], ["evidence"], ["source", "source"]], at("only-failed"));
   at("values").hidden = !run.scalars.length;
   at("values-title").textContent = `All values (${run.scalars.length})`;
@@ -178,7 +179,8 @@ async function choose(index) {
   at("fields").closest("label").hidden = !told.fields.length;
   options(at("scale"), (solid.moves ? SCALES : [1]).map(String), solid.moves ? 1 : 0);
   [...at("scale").options].forEach((option) => { option.value = option.text; });
-  at("stage-notes").textContent = told.notes.length ? `Shown: ${told.notes.join("; ")}.` : "";
+  at("stage-notes").hidden = !told.notes.length;
+  at("stage-notes").lastElementChild.textContent = `${told.notes.join("; ")}.`;
   draw();
   stage.reset();
 }
@@ -229,6 +231,9 @@ function groups() {
   const first = ({ name, tables }) => tables.some((table) => table.main !== null)
     ? -1 : ["history", "load", "probe", "point", "profile"].indexOf(name) >>> 0;
   const list = [...found.values()].sort((a, b) => first(a) - first(b));
+  // variants in the order of the scene
+  const place = ({ name }) => run.variants.findIndex((variant) => name.endsWith(`[${variant}]`));
+  list.forEach((entry) => entry.tables.sort((a, b) => place(a) - place(b)));
   list.forEach((entry) => { entry.label = entry.tables.length === 1 ? entry.tables[0].name : `${entry.name} (${entry.tables.length})`; });
   return list;
 }
@@ -241,7 +246,7 @@ function columns() {
   options(at("x"), names, 0);
   options(at("y"), names, 1);
   // those of the scene, otherwise some of all
-  const main = group.filter((table) => table.main !== null).sort((a, b) => a.main - b.main);
+  const main = group.filter((table) => table.main !== null).sort((a, b) => a.main - b.main || group.indexOf(a) - group.indexOf(b));
   const spread = Array.from({ length: Math.min(FIRST, group.length) }, (_, k) =>
     group[Math.round(k * (group.length - 1) / Math.max(1, Math.min(FIRST, group.length) - 1))]);
   chosen = (main.length ? main : spread).slice(0, FIRST);

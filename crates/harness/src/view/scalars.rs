@@ -25,7 +25,7 @@ const SIX: [&str; 6] = ["11", "22", "33", "12", "23", "13"];
 const OF_NINE: [usize; 6] = [0, 4, 8, 1, 5, 2];
 
 impl ArrayScalar {
-    /// The unit of values up to `largest`, and what to multiply by.
+    /// Returns the unit of values up to `largest`, and what to multiply by.
     pub fn shown(&self, largest: f64) -> (&'static str, f64) {
         let units: &[(&'static str, f64)] = match self.unit {
             "Pa" => &[("GPa", 1e-9), ("MPa", 1e-6), ("kPa", 1e-3)],
@@ -37,7 +37,7 @@ impl ArrayScalar {
     }
 }
 
-/// The scalars of an array, those of bodies in a plane without the third direction.
+/// Returns the scalars of an array, those of bodies in a plane without the third direction.
 pub fn scalars(array: &str, components: usize, plane: bool) -> Vec<ArrayScalar> {
     let (stem, unit) = match array {
         _ if array.starts_with("cauchy") || array.starts_with("piola") => (array, "Pa"),

@@ -181,7 +181,7 @@ impl PageSolid {
 mod tests {
     use super::*;
 
-    /// A brick of n³ hexahedra, with a tetrahedron of second order and a vertex beside it.
+    /// Returns a brick of n³ hexahedra, with a tetrahedron of second order and a vertex beside it.
     fn brick(n: usize) -> (Vec<[f64; 3]>, Cells) {
         let m = n + 1;
         let mut points: Vec<[f64; 3]> =

@@ -195,7 +195,7 @@ class Stage {
             const x = area.left + along;
             all.push(svg("line", { x1: x, x2: x, y1: bottom, y2: bottom + 5, class: "axis" }));
             // the unit stands at the end of the axis
-            if (along > 16 && along < area.width - 44) {
+            if (along > 16 && along < area.width - 72) {
               all.push(svg("text", { x, y: bottom + 20, "text-anchor": "middle" }, number(tick)));
             }
           } else if (along < area.height - 4) {

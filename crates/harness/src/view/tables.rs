@@ -90,7 +90,9 @@ impl PageTables {
     pub fn prepare(&mut self, units: &SceneUnits, listed: &[String]) {
         for table in &mut self.tables {
             let plain = table.name.split('[').next().unwrap_or_default();
-            table.main = listed.iter().position(|name| matches_pattern(name, &table.name) || matches_pattern(name, plain));
+            table.main = listed
+                .iter()
+                .position(|name| matches_pattern(name, &table.name) || matches_pattern(name, plain));
             for column in &mut table.columns {
                 let largest = column.data.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
                 let Some(unit) = units.shown(&column.unit, largest) else { continue };

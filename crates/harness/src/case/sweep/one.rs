@@ -58,8 +58,8 @@ impl Run {
         Ok(crate::case::run::<C>(&self.source, Options { resume, ..options })?.report)
     }
 
-    /// A fault of a scene that nobody wrote, as one of the options that made it: of that at whose key it is,
-    /// else of all.
+    /// Returns a fault of a scene that nobody wrote, as one of the options that made it: of that at whose key
+    /// it is, else of all.
     pub fn of_options(&self, scene: &Source, vary: &[Vary], fault: &SceneError) -> Error {
         let set = format!("{SWEEP}.set.");
         let key = fault.key().unwrap_or_default().trim_start_matches(set.as_str());
@@ -117,7 +117,8 @@ pub(super) fn quoted(text: &str) -> String {
     serde_json::Value::from(text).to_string()
 }
 
-/// A value as TOML: numbers, truth values, arrays, tables and texts in quotes as they are, all else a text.
+/// Returns a value as TOML: numbers, truth values, arrays, tables and texts in quotes as they are, all else a
+/// text.
 fn literal(value: &str) -> String {
     if let Ok(whole) = value.parse::<i64>() {
         return whole.to_string();

@@ -34,7 +34,8 @@ impl FromStr for Sample {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let usage = "KEY=FILE, e.g. materials.pa12.kinetics=out/fit/nakamura_posterior.csv; =FILE if its columns are whole paths";
+        let usage = "KEY=FILE, e.g. materials.pa12.kinetics=out/fit/nakamura_posterior.csv; \
+                     =FILE if its columns are whole paths";
         match text.split_once('=') {
             Some((key, file)) if !file.trim().is_empty() => {
                 Ok(Self { key: key.trim().to_owned(), file: file.trim().into() })
@@ -44,8 +45,8 @@ impl FromStr for Sample {
     }
 }
 
-/// The first `count` rows of all samples as values of keys that change together: samples are independent of
-/// each other. Without a `count` they are 20, or the rows of the shortest file.
+/// Returns the first `count` rows of all samples as values of keys that change together: samples are
+/// independent of each other. Without a `count` they are 20, or the rows of the shortest file.
 ///
 /// # Errors
 /// A file that is not a table of numbers, or has fewer rows.

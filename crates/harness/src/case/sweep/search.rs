@@ -62,7 +62,8 @@ pub fn search<C: Case>(
             return Err(Error::Option { option: format!("--search {key}"), reason }.into());
         }
         let first = rows.rows.iter().take(values.len()).map(met).collect();
-        Ok((first, Finished::new(report, rows.text())))
+        let table = Some(rows.short_text(super::WIDTH));
+        Ok((first, Finished { table, ..Finished::new(report, rows.text()) }))
     };
     let (met, mut finished) = try_out(&[*low, *high])?;
     let verdict = match met[..] {
@@ -99,6 +100,7 @@ pub fn search<C: Case>(
         }
     };
     finished.text += &format!("{verdict}\n");
+    finished.table.iter_mut().for_each(|table| *table += &format!("{verdict}\n"));
     Ok(finished)
 }
 

@@ -44,7 +44,7 @@ impl FromStr for Shard {
 
 impl Shard {
     /// Returns whether the part contains a run, counted from 0.
-    pub fn has(&self, run: usize) -> bool {
+    pub fn contains(&self, run: usize) -> bool {
         run % self.of == self.index - 1
     }
 }
@@ -70,7 +70,8 @@ pub fn job<C: Case>(
     Ok(format!("{runs} runs in {} parts: sbatch {}", parts.min(runs), path.display()))
 }
 
-/// A SLURM job array of a sweep: `command` is its command line without `--slurm`, to be started in `folder`.
+/// Returns a SLURM job array of a sweep: `command` is its command line without `--slurm`, to be started in
+/// `folder`.
 fn script(command: &[String], folder: &Path, output: &Path, of: usize) -> String {
     let quoted = |text: &str| format!("'{}'", text.replace('\'', "'\\''"));
     let line: Vec<String> = command.iter().map(|word| quoted(word)).collect();
@@ -102,7 +103,7 @@ mod tests {
         let of = |text: &str| text.parse::<Shard>();
         let shards: Vec<Shard> = ["1/3", "2/3", "3/3"].map(|text| of(text).unwrap()).into();
         for run in 0..10 {
-            assert_eq!(shards.iter().filter(|shard| shard.has(run)).count(), 1);
+            assert_eq!(shards.iter().filter(|shard| shard.contains(run)).count(), 1);
         }
         for wrong in ["", "1", "0/3", "4/3", "1/0", "-1/3", "a/b", "1/3/3", "1/100000"] {
             assert!(of(wrong).unwrap_err().contains("allowed"), "{wrong}");

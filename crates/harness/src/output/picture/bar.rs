@@ -1,7 +1,7 @@
 //! The colour bar beside a field.
 
 use super::axis::{labels, ticks};
-use super::canvas::{LabelAnchor, BLACK, Canvas, Text};
+use super::canvas::{BLACK, Canvas, LabelAnchor, Text};
 use super::color::ColorMap;
 
 /// Sizes of letters: of a bar's name, of its ticks.
@@ -53,7 +53,7 @@ impl ColorBar {
         let (start, length) = (y + top, height - top - bottom);
         for row in 0..length {
             let share = 1.0 - (row as f64 + 0.5) / length as f64;
-            canvas.rectangle(x, start + row, width, 1, colors.at(share));
+            canvas.rectangle(x, start + row, width, 1, colors.color_at(share));
         }
         canvas.frame(x, start, width, length, LINE, BLACK);
         for (there, base, direction, share) in
@@ -62,7 +62,7 @@ impl ColorBar {
             if there {
                 for step in 0..width / 2 {
                     let row = if direction < 0 { base - 1 - step } else { base + step };
-                    canvas.rectangle(x + step, row, width - 2 * step, 1, colors.at(share));
+                    canvas.rectangle(x + step, row, width - 2 * step, 1, colors.color_at(share));
                     for edge in [x + step, x + width - 1 - step] {
                         canvas.rectangle(edge - 1, row, LINE + 1, 1, BLACK);
                     }

@@ -69,7 +69,7 @@ impl Canvas {
         }
     }
 
-    /// The green of every pixel, row by row: all there is of a grey picture.
+    /// Returns the green of every pixel, row by row: all there is of a grey picture.
     pub(super) fn greens(&self) -> impl Iterator<Item = u8> {
         self.pixels.iter().map(|pixel| pixel[1])
     }
@@ -131,8 +131,8 @@ impl Canvas {
         }
     }
 
-    /// The least rectangle (left, top, width, height) outside of which nothing differs from an image of the
-    /// same size; one pixel where nothing does.
+    /// Returns the least rectangle (left, top, width, height) outside of which nothing differs from an image
+    /// of the same size; one pixel where nothing does.
     fn difference(&self, other: &Self) -> [usize; 4] {
         let differs =
             |x: usize, y: usize| self.pixels[y * self.width + x] != other.pixels[y * self.width + x];
@@ -182,8 +182,8 @@ impl Canvas {
     }
 }
 
-/// An animated PNG of images of one size, one after another without end; the last is shown `rest` times as
-/// long.
+/// Returns an animated PNG of images of one size, one after another without end; the last is shown `rest`
+/// times as long.
 ///
 /// # Errors
 /// Those of `frame`; no frame; what cannot be encoded.

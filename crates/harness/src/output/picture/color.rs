@@ -28,8 +28,8 @@ static INFERNO: LazyLock<ColorTable> = LazyLock::new(|| table(&Kuva::Inferno, 0.
 static DIVERGING: LazyLock<ColorTable> = LazyLock::new(|| table(&Kuva::RedBlue, 1.0, 0.0));
 
 impl ColorMap {
-    /// The colour at `share` between 0 and 1 (clamped); grey for NaN.
-    pub(super) fn at(self, share: f64) -> [u8; 3] {
+    /// Returns the colour at `share` between 0 and 1 (clamped); grey for NaN.
+    pub(super) fn color_at(self, share: f64) -> [u8; 3] {
         if share.is_nan() {
             return MISSING;
         }
@@ -42,7 +42,7 @@ impl ColorMap {
     }
 }
 
-/// A part of a scheme.
+/// Returns a part of a scheme.
 fn table(map: &Kuva, from: f64, to: f64) -> ColorTable {
     std::array::from_fn(|index| {
         // none only for custom maps

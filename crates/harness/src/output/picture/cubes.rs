@@ -23,8 +23,8 @@ pub struct Particles<'a> {
 const STEPS: [[i64; 3]; 6] = [[-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]];
 
 impl Particles<'_> {
-    /// The surface: faces without a neighbour, or with a crack in front. A plane removes particles by their
-    /// reference positions; `value` gives the values of a particle.
+    /// Returns the surface: faces without a neighbour, or with a crack in front. A plane removes particles by
+    /// their reference positions; `value` gives the values of a particle.
     pub fn skin(&self, cut: Option<Plane>, value: impl Fn(usize) -> [f64; 2]) -> Skin {
         // whole particles: nothing is cut in two
         let mut skin = Skin::new(None);

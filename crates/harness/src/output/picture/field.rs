@@ -10,9 +10,9 @@ use rayon::prelude::*;
 use super::axis::{labels, ticks};
 use super::bar::{ColorBar, LABEL, LINE, TICK, TICK_LENGTH};
 use super::blocks::ParticleBlocks;
-use super::canvas::{LabelAnchor, BLACK, Canvas, Text};
+use super::canvas::{BLACK, Canvas, LabelAnchor, Text};
 use super::color::{ColorMap, MISSING};
-use super::particles::{Raster, PixelWindow};
+use super::particles::{PixelWindow, Raster};
 use super::picture_error;
 use polycore::Error;
 use polycore::file::atomic_write;
@@ -242,8 +242,8 @@ impl<'a> FieldMap<'a> {
             let mut outlined = Vec::with_capacity(panels.len());
             for panel in panels {
                 panel.check()?;
-                let window =
-                    PixelWindow::around(panel.positions, panel.spacing, self.size as f64).ok_or_else(|| {
+                let window = PixelWindow::around(panel.positions, panel.spacing, self.size as f64)
+                    .ok_or_else(|| {
                         format!("panel `{}`: positions are not finite or too far apart", panel.title)
                     })?;
                 let kept = last.take().filter(|(other, _)| panel.has_outline_of(other));
@@ -251,7 +251,9 @@ impl<'a> FieldMap<'a> {
                 outlined.push((panel, window, Arc::clone(&blocks)));
                 last = Some((panel, blocks));
             }
-            let draw = |(panel, window, blocks): (_, PixelWindow, Arc<ParticleBlocks>)| self.draw(panel, &window, &blocks);
+            let draw = |(panel, window, blocks): (_, PixelWindow, Arc<ParticleBlocks>)| {
+                self.draw(panel, &window, &blocks)
+            };
             drawn.extend(outlined.into_par_iter().map(draw).collect::<Result<Vec<Canvas>, String>>()?);
         }
         let columns = self.columns.unwrap_or(drawn.len()).min(drawn.len());
@@ -272,7 +274,12 @@ impl<'a> FieldMap<'a> {
         Ok(canvas)
     }
 
-    fn draw(&self, panel: &Panel<'_>, window: &PixelWindow, blocks: &ParticleBlocks) -> Result<Canvas, String> {
+    fn draw(
+        &self,
+        panel: &Panel<'_>,
+        window: &PixelWindow,
+        blocks: &ParticleBlocks,
+    ) -> Result<Canvas, String> {
         let raster = window.draw(panel.positions, panel.values, blocks);
         let (low, high) = panel.limits();
         let beyond =
@@ -291,8 +298,11 @@ impl<'a> FieldMap<'a> {
         for (at, value) in raster.values.iter().enumerate() {
             if let Some(value) = value {
                 let (column, row) = (at % raster.width, at / raster.width);
-                let color =
-                    if value.is_nan() { MISSING } else { panel.colors.at((value - low) / (high - low)) };
+                let color = if value.is_nan() {
+                    MISSING
+                } else {
+                    panel.colors.color_at((value - low) / (high - low))
+                };
                 canvas.set(x + column as isize, y + row as isize, color);
             }
         }
@@ -398,7 +408,8 @@ mod tests {
     #[test]
     fn narrow_fields_have_ticks() {
         for (half, width) in [(9.0, 70), (10.5, 62), (10.5, 100), (40.0, 240), (0.9, 120), (1e5, 120)] {
-            let window = PixelWindow { low: [-half, 0.0], high: [half, half], scale: width as f64 / (2.0 * half) };
+            let window =
+                PixelWindow { low: [-half, 0.0], high: [half, half], scale: width as f64 / (2.0 * half) };
             let raster = Raster { width, height: width / 2, values: Vec::new() };
             let axes = Axes::new(&window, &raster, &("mm".to_owned(), 1.0), ["x", "y"]).unwrap();
             let across = &axes.ticks[0];

@@ -71,7 +71,7 @@ impl Series {
         Self::new(name, x, y, SeriesStyle::Both)
     }
 
-    /// A dashed black line: what the others are compared with.
+    /// Returns a dashed black line, a reference for the others.
     pub fn reference(name: &str, x: &[f64], y: &[f64]) -> Self {
         Self::new(name, x, y, SeriesStyle::Reference)
     }
@@ -84,14 +84,14 @@ impl Series {
         Self { name: name.to_owned(), points, style }
     }
 
-    /// The runs between undefined points.
+    /// Returns the runs between undefined points.
     pub(super) fn runs(&self) -> impl Iterator<Item = &[(f64, f64)]> {
         self.points.split(|(x, y)| x.is_nan() || y.is_nan()).filter(|run| !run.is_empty())
     }
 }
 
 impl LinePlot {
-    /// A plot with linear axes and no series yet.
+    /// Returns a plot with linear axes and no series yet.
     pub fn new(title: &str) -> Self {
         Self {
             title: title.to_owned(),
@@ -112,13 +112,13 @@ impl LinePlot {
         self
     }
 
-    /// A logarithmic x axis.
+    /// Makes the x axis logarithmic.
     pub fn log_x(mut self) -> Self {
         self.log[0] = true;
         self
     }
 
-    /// A logarithmic y axis.
+    /// Makes the y axis logarithmic.
     pub fn log_y(mut self) -> Self {
         self.log[1] = true;
         self

@@ -9,7 +9,7 @@ use kuva::render::color::Color;
 use kuva::render::render::{PathData, Primitive, Scene, TextAnchor};
 
 use super::axis::PlotAxis;
-use super::canvas::{LabelAnchor, Canvas, Text};
+use super::canvas::{Canvas, LabelAnchor, Text};
 use super::line::{LegendPlace, LinePlot, SeriesStyle};
 use super::picture_error;
 use polycore::Error;

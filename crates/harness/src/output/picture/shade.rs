@@ -1,7 +1,7 @@
 //! Rendering of faces: parallel projection, depth buffer, light and colour.
 
 use super::canvas::Canvas;
-use super::skin::{SkinFace, Skin, cross, dot, minus};
+use super::skin::{Skin, SkinFace, cross, dot, minus};
 use super::strips::Strip;
 
 /// Samples along a pixel's side.
@@ -139,7 +139,7 @@ impl<'a> Sight<'a> {
                     }
                     let value = (0..3).map(|k| weights[k] * values[k]).sum::<f64>();
                     beyond = [beyond[0] || value < low - room, beyond[1] || value > high + room];
-                    let color = strip.colors.at((value - low) / (high - low));
+                    let color = strip.colors.color_at((value - low) / (high - low));
                     let light = if flat.is_edge(p) { flat.light * (1.0 - flat.edge) } else { flat.light };
                     colors[at] = color.map(|channel| (light * f64::from(channel) + 0.5) as u8);
                 });
@@ -220,8 +220,8 @@ mod tests {
         Strip { label: String::new(), range: (0.0, 1.0), colors: ColorMap::Viridis }
     }
 
-    /// The unit cube, each side of another value; edges are too few pixels away to matter in the middle of a
-    /// side.
+    /// Returns the unit cube, each side of another value; edges are too few pixels away to matter in the
+    /// middle of a side.
     fn cube(cut: Option<Plane>) -> Skin {
         let mut skin = Skin::new(cut);
         for side in 0..6 {
@@ -281,7 +281,7 @@ mod tests {
                 middle[axis] = (side % 2) as f64;
                 let [x, y, _] = camera.place(middle).map(|x| (x / SAMPLES as f64) as usize);
                 let light = AMBIENT + (1.0 - AMBIENT) * (dot(normal, LAMP) / lamp).max(0.0);
-                let color = ColorMap::Viridis.at(0.2 * side as f64).map(|x| light * f64::from(x));
+                let color = ColorMap::Viridis.color_at(0.2 * side as f64).map(|x| light * f64::from(x));
                 let found = canvas.get(x, y);
                 assert!(
                     (0..3).all(|k| (f64::from(found[k]) - color[k]).abs() <= 1.0),
@@ -307,7 +307,7 @@ mod tests {
             Sight::new(&skin, camera(view), [SIZE; 2]).paint(1, &strip(), &mut canvas, 0, 0);
             let light = AMBIENT + (1.0 - AMBIENT) * LAMP[2] / dot(LAMP, LAMP).sqrt();
             for (x, value) in [(200, 0.0), (200 + 30, 0.0), (200 + 60, 1.0)] {
-                let color = ColorMap::Viridis.at(value).map(|x| (light * f64::from(x)).round() as u8);
+                let color = ColorMap::Viridis.color_at(value).map(|x| (light * f64::from(x)).round() as u8);
                 assert_eq!(canvas.get(x, 200), color, "{x}");
             }
             assert_eq!(canvas.get(399, 200), [255; 3]);
@@ -371,7 +371,7 @@ mod tests {
         let light = AMBIENT + (1.0 - AMBIENT) * (dot(normal, LAMP) / dot(LAMP, LAMP).sqrt()).max(0.0);
         for [x, z] in [[0.5, 0.5], [0.2, 0.3], [0.7, 0.9]] {
             let [i, j, _] = camera.place([x, 0.5, z]).map(|x| (x / SAMPLES as f64) as usize);
-            let color = ColorMap::Viridis.at(0.5 * (x + z)).map(|x| light * f64::from(x));
+            let color = ColorMap::Viridis.color_at(0.5 * (x + z)).map(|x| light * f64::from(x));
             let found = canvas.get(i, j);
             assert!(
                 (0..3).all(|k| (f64::from(found[k]) - color[k]).abs() <= 2.0),

@@ -60,7 +60,7 @@ impl View {
         [[-s, c, 0.0], [-up * c, -up * s, along], [along * c, along * s, up]]
     }
 
-    /// The same plane with its normal towards the viewer: it removes the part in front.
+    /// Returns the same plane with its normal towards the viewer: it removes the part in front.
     pub fn facing(&self, plane: Plane) -> Plane {
         if dot(plane.normal, self.axes()[2]) < 0.0 {
             Plane { normal: plane.normal.map(|x| -x), at: -plane.at }
@@ -76,7 +76,7 @@ impl Plane {
         dot(self.normal, x) - self.at
     }
 
-    /// The intersection with the edge from a corner to another one on the other side.
+    /// Returns the intersection with the edge from a corner to another one on the other side.
     fn between(&self, a: &Corner, b: &Corner) -> Corner {
         let (from, to) = (self.side(a.at), self.side(b.at));
         let t = from / (from - to);
@@ -89,7 +89,7 @@ impl Plane {
 }
 
 impl Skin {
-    /// An empty surface. A plane cuts all faces that come.
+    /// Returns an empty surface. A plane cuts all faces that come.
     pub fn new(cut: Option<Plane>) -> Self {
         Self { cut, faces: Vec::new() }
     }

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use super::axis::labels;
 use super::bar::{ColorBar, TICK};
-use super::canvas::{LabelAnchor, Canvas, Color, Text, film};
+use super::canvas::{Canvas, Color, LabelAnchor, Text, film};
 use super::picture_error;
 use super::shade::{Camera, Sight};
 use super::skin::{Skin, View};
@@ -269,7 +269,7 @@ impl Solids {
         Ok(())
     }
 
-    /// A layout with panels of `longest` pixels that hold the bounds in each of the views.
+    /// Returns a layout with panels of `longest` pixels that hold the bounds in each of the views.
     fn layout(&self, stages: usize, views: &[View], longest: f64) -> Result<SolidLayout, String> {
         self.check(stages, views)?;
         let [low, high] = self.bounds;
@@ -295,8 +295,9 @@ impl Solids {
         let head = MARGIN + if self.title.is_empty() { 0 } else { TITLE as usize * 3 / 2 };
         let origin = [MARGIN, head + LINE];
         let rows = if stacked { stages * (panel[1] + LINE) - LINE } else { panel[1] };
-        let bar =
-            |strip: &Strip| ColorBar::new(&strip.label, strip.range, [false; 2], rows.clamp(LEAST_BAR, MOST_BAR));
+        let bar = |strip: &Strip| {
+            ColorBar::new(&strip.label, strip.range, [false; 2], rows.clamp(LEAST_BAR, MOST_BAR))
+        };
         let bars = self.fields.iter().map(bar).collect::<Result<Vec<ColorBar>, String>>()?;
         let of_bars = |size: fn(&ColorBar) -> usize| bars.iter().map(size).max().unwrap_or(0);
         let [wide, tall] = [of_bars(|bar| bar.width), of_bars(|bar| bar.height)];
@@ -365,7 +366,7 @@ mod tests {
         }
     }
 
-    /// A square across the box, further along at each stage.
+    /// Returns a square across the box, further along at each stage.
     fn stage(index: usize) -> SolidStage {
         let mut skin = Skin::new(None);
         let corner = |y: f64, z: f64| Corner { at: [1e-3 * index as f64, y, z], values: [z * 1e3, 0.5] };

@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::Path;
 
 use super::axis::{labels, ticks};
-use super::canvas::{LabelAnchor, BLACK, Canvas, Text};
+use super::canvas::{BLACK, Canvas, LabelAnchor, Text};
 use super::color::ColorMap;
 use super::picture_error;
 use polycore::Error;
@@ -155,7 +155,7 @@ impl Strips<'_> {
     fn palette(&self) -> Vec<u8> {
         let greys = (0..GREYS).map(|k| [(255 * k / (GREYS - 1)) as u8; 3]);
         let levels = |strip: &Strip| -> Vec<[u8; 3]> {
-            (0..LEVELS).map(|k| strip.colors.at(k as f64 / (LEVELS - 1) as f64)).collect()
+            (0..LEVELS).map(|k| strip.colors.color_at(k as f64 / (LEVELS - 1) as f64)).collect()
         };
         greys.chain(self.columns.iter().flat_map(levels)).flatten().collect()
     }
@@ -185,7 +185,7 @@ impl Strips<'_> {
         Ok(())
     }
 
-    /// The stages below one another, on one axis of lengths and one colour bar a field.
+    /// Returns the stages below one another, on one axis of lengths and one colour bar a field.
     fn sheet(&self, stages: &[Stage]) -> Result<Sheet, String> {
         self.check(stages)?;
         let [across, up] = self.samples;
@@ -341,7 +341,7 @@ mod tests {
                 // the raster without the sample that is nothing, and a level of the bar
                 let last = (LEVELS - 1) as f64;
                 let level = (frame as f64 / 2.0 * last).round();
-                assert!(pixel(colors.at(level / last)) >= 3599, "frame {frame}");
+                assert!(pixel(colors.color_at(level / last)) >= 3599, "frame {frame}");
             }
             assert!(pixel([255; 3]) > 3600);
         }

@@ -110,7 +110,7 @@ fn what_cannot_be_drawn_is_refused() {
     LinePlot::new("").series(Series::line("<&\"", &[1.0, 2.0, 3.0], &[1.0])).write(&path).unwrap();
 }
 
-/// A plate with a hole under tension: enough to see edges, extremes and a deformed shape.
+/// Returns a plate with a hole under tension: enough to see edges, extremes and a deformed shape.
 fn plate(columns: usize, stretch: f64) -> (Vec<[f64; 2]>, Vec<f64>) {
     let spacing = 1.0 / columns as f64;
     let mut positions = Vec::new();

@@ -123,7 +123,7 @@ impl FrameFiles {
         remove(&temporary_name(&self.path))
     }
 
-    /// The file of a step.
+    /// Returns the file of a step.
     pub fn frame(&self, step: usize) -> PathBuf {
         self.frames.join(format!("{step:04}.vtkhdf"))
     }

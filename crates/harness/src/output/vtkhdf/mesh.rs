@@ -53,10 +53,11 @@ impl MeshSeries {
     /// [`Error::Data`] if the arrays do not fit the mesh, [`Error::Io`] or [`Error::Format`] if writing
     /// fails.
     pub fn step(&mut self, time: f64, point_data: &[Data<'_>], cell_data: &[Data<'_>]) -> Result<(), Error> {
-        let layout = Layout::of(self.counts, point_data, cell_data)?;
+        let layout = Layout::from_data(self.counts, point_data, cell_data)?;
         let [arrays, cell_arrays] = [point_data, cell_data]
             .map(|data| data.iter().map(|(_, _, values)| PackedRows::Values((*values).into())).collect());
-        self.frames.step(&layout, StepContent { time, points: None, arrays, cell_arrays, moments: Vec::new() })
+        self.frames
+            .step(&layout, StepContent { time, points: None, arrays, cell_arrays, moments: Vec::new() })
     }
 
     /// Merges all steps into the one transient file and removes the frames; returns its path.

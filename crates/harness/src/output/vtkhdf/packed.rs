@@ -58,13 +58,13 @@ impl StoredTable {
         Ok(())
     }
 
-    /// The chunk of a step.
+    /// Returns the chunk of a step.
     fn place(&self, at: usize) -> Vec<usize> {
         if self.columns == 1 { vec![at] } else { vec![at, 0] }
     }
 
-    /// The step `at` of the same dataset of another file as it is packed there, if it is stored in the same
-    /// way.
+    /// Returns the step `at` of the same dataset of another file as it is packed there, if it is stored in
+    /// the same way.
     pub fn same_of(&self, file: &H5File, name: &str, at: usize) -> Option<Vec<u8>> {
         let other = file.dataset(name).ok()?;
         let chunk = if self.columns == 1 { vec![self.rows] } else { vec![self.rows, self.columns] };
@@ -95,7 +95,7 @@ impl PackedRows<'_> {
     }
 }
 
-/// The first bytes of all values, then their second bytes, and so on (HDF5's shuffle), deflated.
+/// Returns the first bytes of all values, then their second bytes, and so on (HDF5's shuffle), deflated.
 fn packed<const N: usize>(values: &[f64], bytes: impl Fn(f64) -> [u8; N]) -> Vec<u8> {
     let mut encoder = ZlibEncoder::new(Vec::with_capacity(values.len() * N / 2), Compression::new(LEVEL));
     let mut sorted = Vec::with_capacity(BLOCK);
@@ -115,7 +115,7 @@ mod tests {
     use rust_hdf5::H5Type;
     use std::path::Path;
 
-    /// A file with an array `a` of some rows to a chunk, and its table.
+    /// Returns a file with an array `a` of some rows to a chunk, and its table.
     fn begun<T: H5Type>(path: &Path, rows: usize, columns: usize) -> (H5File, StoredTable) {
         let file = H5File::create(path).unwrap();
         let builder = file.new_dataset::<T>().shape([0, columns]).chunk(&[rows, columns]);

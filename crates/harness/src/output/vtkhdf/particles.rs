@@ -58,7 +58,7 @@ impl ParticleSeries {
         moments: &[Moment<'_>],
     ) -> Result<(), Error> {
         check_points(points)?;
-        let layout = Layout::of([points.len(), 0], point_data, &[])?.and(moments)?;
+        let layout = Layout::from_data([points.len(), 0], point_data, &[])?.and(moments)?;
         let of = |name: &String| moments.iter().find(|m| m.0 == name).map_or(f64::NAN, |m| m.1);
         let moments = layout.moments.iter().map(of).collect();
         for (name, components, values) in point_data {

@@ -97,18 +97,18 @@ pub fn read(path: impl AsRef<Path>) -> Result<Series, Error> {
 }
 
 impl Series {
-    /// The times of the steps, in the unit the writer used.
+    /// Returns the times of the steps, in the unit the writer used.
     pub fn times(&self) -> &[f64] {
         &self.times
     }
 
-    /// The number of steps, at least one.
+    /// Returns the number of steps, at least one.
     #[allow(clippy::len_without_is_empty)]
     pub fn len(&self) -> usize {
         self.times.len()
     }
 
-    /// A number of a step as a whole.
+    /// Returns a number of a step as a whole.
     pub fn moment(&self, step: usize, name: &str) -> Option<f64> {
         self.moments.iter().find(|(other, _)| other == name)?.1.get(step).copied()
     }
@@ -118,17 +118,17 @@ impl Series {
         self.layout.points
     }
 
-    /// Names and numbers of components of the point arrays.
+    /// Returns names and numbers of components of the point arrays.
     pub fn arrays(&self) -> &[(String, usize)] {
         &self.layout.arrays
     }
 
-    /// Names and numbers of components of the cell arrays; none of particles.
+    /// Returns names and numbers of components of the cell arrays; none of particles.
     pub fn cell_arrays(&self) -> &[(String, usize)] {
         &self.layout.cell_arrays
     }
 
-    /// The cells of a mesh; none of particles.
+    /// Returns the cells of a mesh; none of particles.
     ///
     /// # Errors
     /// [`Error::Format`] for damaged data.
@@ -160,7 +160,7 @@ impl Series {
         self.moves
     }
 
-    /// The positions at a step.
+    /// Returns the positions at a step.
     ///
     /// # Errors
     /// [`Error::Data`] beyond the last step, [`Error::Format`] for damaged data.
@@ -170,7 +170,7 @@ impl Series {
         Ok(flat.chunks_exact(3).map(|point| [point[0], point[1], point[2]]).collect())
     }
 
-    /// A point array at a step, the components of a point together.
+    /// Returns a point array at a step, the components of a point together.
     ///
     /// # Errors
     /// [`Error::Data`] beyond the last step or for an unknown name, [`Error::Format`] for damaged data.
@@ -178,7 +178,7 @@ impl Series {
         self.array("point", &self.layout.arrays, self.layout.points, step, name)
     }
 
-    /// A cell array at a step, the components of a cell together.
+    /// Returns a cell array at a step, the components of a cell together.
     ///
     /// # Errors
     /// As [`Series::data`].
@@ -206,7 +206,8 @@ impl Series {
         self.rows(&format!("{group}/{name}"), *components, step * count, count)
     }
 
-    /// An array at a step for a table of another file: packed as it is where both store it in the same way.
+    /// Returns an array at a step for a table of another file: packed as it is where both store it in the
+    /// same way.
     pub(super) fn packed(
         &self,
         table: &StoredTable,

@@ -32,8 +32,13 @@ type Hdf5Result<T> = Result<T, rust_hdf5::Hdf5Error>;
 type MeshContent = (Vec<[f64; 3]>, Cells);
 
 impl Writer {
-    /// A file for exactly `steps` steps; of particles where there is no mesh.
-    pub fn create(path: &Path, layout: &Layout, mesh: Option<&MeshContent>, steps: usize) -> Result<Self, Error> {
+    /// Returns a file for exactly `steps` steps; of particles where there is no mesh.
+    pub fn create(
+        path: &Path,
+        layout: &Layout,
+        mesh: Option<&MeshContent>,
+        steps: usize,
+    ) -> Result<Self, Error> {
         Self::begin(path, layout, mesh, steps).map_err(|error| write_error(path, error))
     }
 
@@ -94,7 +99,7 @@ impl Writer {
         Ok(())
     }
 
-    /// The datasets of points, arrays on points and arrays on cells, in their order in a step.
+    /// Returns the datasets of points, arrays on points and arrays on cells, in their order in a step.
     pub fn tables(&self) -> [&[StoredTable]; 3] {
         [self.points.as_slice(), &self.arrays, &self.cell_arrays]
     }
@@ -174,8 +179,13 @@ fn integers(group: &H5Group, name: &str, values: &[i64]) -> Hdf5Result<()> {
     group.new_dataset::<i64>().shape([values.len()]).create(name)?.write_raw(values)
 }
 
-/// An empty compressed dataset with unlimited rows; a step is a chunk.
-fn table<T: rust_hdf5::H5Type>(group: &H5Group, name: &str, columns: usize, rows: usize) -> Hdf5Result<H5Dataset> {
+/// Returns an empty compressed dataset with unlimited rows; a step is a chunk.
+fn table<T: rust_hdf5::H5Type>(
+    group: &H5Group,
+    name: &str,
+    columns: usize,
+    rows: usize,
+) -> Hdf5Result<H5Dataset> {
     let chunk = rows.max(1);
     let builder = group.new_dataset::<T>();
     let builder = if columns == 1 {
