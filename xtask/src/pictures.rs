@@ -172,7 +172,8 @@ pub fn findings(root: &Path, files: &[PathBuf]) -> Result<Vec<String>> {
             findings.push(format!("{key}: stale; run `cargo xtask pictures`"));
         }
     }
-    let is_picture = |file: &&PathBuf| file.starts_with("docs") && file.extension().is_some_and(|e| e == "png");
+    let is_picture =
+        |file: &&PathBuf| file.starts_with("docs") && file.extension().is_some_and(|e| e == "png");
     for file in files.iter().filter(is_picture).filter(|file| root.join(file).is_file()) {
         if !list.picture.iter().any(|picture| picture.file == *file) {
             findings.push(format!("{}: not in {LIST}", file.display()));

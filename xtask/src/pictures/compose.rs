@@ -25,7 +25,8 @@ impl Image {
         let name = || path.display().to_string();
         let bytes = fs::read(path).into_diagnostic().wrap_err_with(name)?;
         let mut decoder = png::Decoder::new(std::io::Cursor::new(bytes));
-        decoder.set_transformations(png::Transformations::normalize_to_color8() | png::Transformations::ALPHA);
+        decoder
+            .set_transformations(png::Transformations::normalize_to_color8() | png::Transformations::ALPHA);
         let mut reader = decoder.read_info().into_diagnostic().wrap_err_with(name)?;
         let size = reader.output_buffer_size().ok_or_else(|| miette!("{}: too large", name()))?;
         let mut buffer = vec![0; size];

@@ -30,11 +30,11 @@ pub fn fill(text: &str, value: impl Fn(&str, &str) -> Option<f64>) -> Result<Str
         let [case, quantity, decimals, factor] =
             parts(inner).ok_or_else(|| miette!("`{inner}`: expected `case > quantity > decimals`"))?;
         let found = value(case, quantity).ok_or_else(|| miette!("{case} has no value `{quantity}`"))?;
-        let (scientific, digits) = decimals.strip_prefix('e').map_or((false, decimals), |digits| (true, digits));
+        let (scientific, digits) =
+            decimals.strip_prefix('e').map_or((false, decimals), |digits| (true, digits));
         let digits: usize = digits.parse().map_err(|_| miette!("`{inner}`: decimals"))?;
-        let factor: f64 = if factor.is_empty() { "1" } else { factor }
-            .parse()
-            .map_err(|_| miette!("`{inner}`: factor"))?;
+        let factor: f64 =
+            if factor.is_empty() { "1" } else { factor }.parse().map_err(|_| miette!("`{inner}`: factor"))?;
         filled += before;
         let number = found * factor;
         filled += &if scientific {
@@ -64,10 +64,12 @@ mod tests {
 
     #[test]
     fn values_in_text() {
-        let value = |case: &str, name: &str| (case == "plate" && name == "peak[dx=1mm m=3]").then_some(-0.0316);
+        let value =
+            |case: &str, name: &str| (case == "plate" && name == "peak[dx=1mm m=3]").then_some(-0.0316);
         let text = "| {plate > peak[dx=1mm m=3] > 2} | {plate > peak[dx=1mm m=3] > 1 > 100} % |";
         assert_eq!(fill(text, value).expect("text"), "| −0.03 | −3.2 % |");
-        let found: Vec<_> = placeholders(text).map(|[case, _, decimals, factor]| [case, decimals, factor]).collect();
+        let found: Vec<_> =
+            placeholders(text).map(|[case, _, decimals, factor]| [case, decimals, factor]).collect();
         assert_eq!(found, [["plate", "2", ""], ["plate", "1", "100"]]);
         assert_eq!(fill("{plate > peak[dx=1mm m=3] > e1}", value).expect("text"), "-3.2e-2");
         for wrong in ["{plate > none > 1}", "{plate}", "{plate > peak[dx=1mm m=3] > x}", "{"] {

@@ -17,7 +17,8 @@ fn updated(root: &Path, page: &str) -> Result<String> {
     let mut lines = page.split_inclusive('\n');
     while let Some(line) = lines.next() {
         text += line;
-        let Some(path) = line.trim_end().strip_prefix(MARKER).and_then(|rest| rest.strip_suffix(" -->")) else {
+        let Some(path) = line.trim_end().strip_prefix(MARKER).and_then(|rest| rest.strip_suffix(" -->"))
+        else {
             continue;
         };
         let fence = lines.next().unwrap_or_default();
@@ -39,7 +40,8 @@ fn shown(root: &Path, path: &str) -> Result<String> {
     let (part, _) = part.ok_or_else(|| miette!("{path}: missing anchor `{anchor}`"))?;
     let lines = || part.lines().filter(|line| !line.trim().is_empty());
     let indent = lines().map(|line| line.len() - line.trim_start().len()).min().unwrap_or(0);
-    let dedented: Vec<&str> = part.trim_end().lines().map(|line| line.get(indent..).unwrap_or_default()).collect();
+    let dedented: Vec<&str> =
+        part.trim_end().lines().map(|line| line.get(indent..).unwrap_or_default()).collect();
     Ok(dedented.join("\n").trim_start_matches('\n').to_owned())
 }
 
@@ -60,7 +62,9 @@ fn pages<'a>(root: &Path, files: &'a [PathBuf]) -> Result<Vec<(&'a PathBuf, Stri
 pub fn update(root: &Path, files: &[PathBuf]) -> Result<()> {
     for (file, page, updated) in pages(root, files)? {
         if page != updated {
-            fs::write(root.join(file), updated).into_diagnostic().wrap_err_with(|| file.display().to_string())?;
+            fs::write(root.join(file), updated)
+                .into_diagnostic()
+                .wrap_err_with(|| file.display().to_string())?;
         }
     }
     Ok(())
