@@ -42,9 +42,6 @@ fn measure<const D: usize>(cells: u32, steps: u64) -> Result<(), Box<dyn std::er
     println!(
         "  host, {threads} threads, Double: {count} bonds, {evaluations} forces, {seconds:.3} s, {rate:.3e} \
          directed bonds/s"
->>=======
-         directed bonds/s"
->>>>>>> theirs
     );
 
     let largest = |field: &Field<D>| {
@@ -81,9 +78,6 @@ fn measure<const D: usize>(cells: u32, steps: u64) -> Result<(), Box<dyn std::er
         println!(
             "  {name}, {precision:?}: {count} bonds, {steps} steps, {seconds:.3} s, {rate:.3e} directed \
              bonds/s, forces off by \
->>=======
-             bonds/s, forces off by \
->>>>>>> theirs
              {error:.1e} of the largest; displacements up to {moved:.3} spacings"
         );
     }

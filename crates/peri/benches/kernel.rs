@@ -46,10 +46,6 @@ pub fn loaded<const D: usize>(
 }
 
 /// Response of a material, and its name.
-pub type Named<const D: usize> = (&'static str, Box<dyn Response<D>>);
-
-=======
-/// Response of a material, and its name.
 pub type Named<const D: usize> = (&'static str, Box<dyn SolverMaterial<D>>);
 
 /// Returns solids with two passes: chains of 25 links, and by correspondence neo-Hookean rubber, K/μ = 100,

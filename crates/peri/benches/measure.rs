@@ -1,6 +1,4 @@
 //! `cargo xtask bench peri`: bond evaluations per second, bytes per particle, and the bandwidth of the
-=======
-//! `cargo xtask bench peri`: bond evaluations per second, bytes per particle, and the bandwidth of the
 //! machine.
 
 use clap::Parser;

@@ -13,8 +13,6 @@ use peri::solver::{Lbfgs, Loads, Method, State, Support, System};
 
 // ANCHOR: material
 /// W = ½K θ² + ½α Σ_J (e − θ|ξ|/D)² V_J with the bonds' extensions e = |ζ| − |ξ|, the weighted volume m = Σ_J
-=======
-/// W = ½K θ² + ½α Σ_J (e − θ|ξ|/D)² V_J with the bonds' extensions e = |ζ| − |ξ|, the weighted volume m = Σ_J
 /// |ξ|² V_J of the whole family, the dilatation θ = (D/m) Σ_J |ξ| e V_J and α = D(D + 2)μ/m.
 #[derive(Clone)]
 pub struct LinearSolid {

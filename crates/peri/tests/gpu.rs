@@ -27,9 +27,6 @@ fn devices() -> Vec<Device> {
         evidence::skipped(
             "a device behind Vulkan, Metal or DirectX 12 (a program that stands for one: \
              mesa-vulkan-drivers)",
->>=======
-             mesa-vulkan-drivers)",
->>>>>>> theirs
         );
     }
     found

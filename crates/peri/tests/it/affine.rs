@@ -1,7 +1,4 @@
 //! Full network of chains: the checks of all materials, and closed forms of its moduli and of a dilation.
->>=======
-//! Full network of chains: the checks of all materials, and closed forms of its moduli and of a dilation.
->>>>>>> theirs
 
 use crate::materials::battery;
 use evidence::near;
@@ -41,12 +38,8 @@ fn energy(law: Affine, gradient: [[f64; 3]; 3]) -> f64 {
     law.energy(&family, &material.points()[middle])
 }
 
-/// At small strains the bulk modulus is K, and Voigt's mean of both shear moduli of the lattice is μ: it
-/// depends on Σŵ(n·n)² = 1 only.
->>=======
 /// The bulk modulus at small strains is K, and Voigt's mean of both shear moduli of the lattice is μ: it
 /// depends on Σŵ(n·n)² = 1 only.
->>>>>>> theirs
 #[test]
 fn small_strains_have_both_moduli() {
     let (bulk, step) = (20.0, 1e-3);

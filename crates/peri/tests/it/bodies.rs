@@ -111,8 +111,7 @@ impl<const D: usize> Body<D> {
     }
 
     /// Returns pairs (I, J), I < J, with reference bond and weight (volume × surface correction), by
-    /// comparing
-    /// all particles.
+    /// comparing all particles.
     pub fn pairs(&self, points: &[[f64; D]]) -> Vec<BondPair<D>> {
         // the smallest gap between lattice distances near the horizons used here is far above this rounding
         // margin

@@ -1,6 +1,4 @@
 //! Solids of the mean deformation in irregular clouds: kernels against plain loops, patch test, order of
-=======
-//! Solids of the mean deformation in irregular clouds: kernels against plain loops, patch test, order of
 //! convergence, a hole.
 
 use crate::bodies::{Random, hold};
@@ -106,8 +104,7 @@ fn both<const D: usize>(bonds: &CloudBonds<D>, site: usize, other: usize, mut na
 }
 
 /// Kernels agree with plain loops, with and without θ: intact, with broken and softened bonds, and with so
-/// few bonds that
-/// particles have springs or no bond.
+/// few bonds that particles have springs or no bond.
 fn kernels_are_plain_loops<const D: usize>(space: Space, side: usize, correction: VolumeCorrection) {
     for relieved in [false, true] {
         let scattered = Scattered { uneven: 0.3, correction, ..Scattered::new(side, 0.25) };
@@ -234,8 +231,7 @@ fn relieved_clouds_agree_with_an_independent_program() {
 }
 
 /// Returns the largest force on an inner particle under a uniform F, over μ and the spacing, and the largest
-/// error
-/// of F.
+/// error of F.
 fn patch<L: PointLaw<D>, const D: usize>(
     bonds: &CloudBonds<D>,
     solid: NonlocalSolid<L>,
@@ -278,8 +274,6 @@ fn jittered_clouds_pass_the_patch_test() {
     }
 }
 
-/// Forces are slopes of the energy to 1e-9: intact, with 30 % of the bonds broken, and with some particles on
-=======
 /// Forces are slopes of the energy to 1e-9: intact, with 30 % of the bonds broken, and with some particles on
 /// springs.
 fn slopes<const D: usize>(space: Space, side: usize, ratio: f64) {
@@ -413,8 +407,7 @@ fn manufactured_deformations_of_clouds_converge() {
 
 /// Plate with a hole as rings of particles, Kirsch's displacements beyond three radii, plane strain, K/μ =
 /// 5/3: rms error of the stress beyond 1.5 radii over the remote stress. The independent program has 0.01763
-/// and
-/// 0.01622 plain; with the correction in all families away from rims 0.00954 and 0.00321 (0.0088 and
+/// and 0.01622 plain; with the correction in all families away from rims 0.00954 and 0.00321 (0.0088 and
 /// 0.0029 with it from two horizons off the rim).
 #[test]
 fn rings_around_a_hole() {
@@ -473,8 +466,6 @@ fn ring_error(n: usize, relieved: bool) -> f64 {
     (sum / f64::from(count)).sqrt()
 }
 
-/// Kirsch's displacement and stress (xx, yy, xy) around a free hole of radius 1 under unit tension along x, μ
-=======
 /// Kirsch's displacement and stress (xx, yy, xy) around a free hole of radius 1 under unit tension along x, μ
 /// = 1, K = 5/3.
 fn kirsch([x, y]: [f64; 2]) -> ([f64; 2], [f64; 3]) {

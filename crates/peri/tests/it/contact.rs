@@ -72,8 +72,6 @@ fn two_particles() {
     assert_eq!(contact(&near, &sites, &[[0.0; 2], [-1.0, 0.0]]), (vec![[0.0; 2]; 2], 0.0));
 }
 
-/// At coincident positions (r = 0) the force is κcd/δ along the reference bond, at any displacement; the
-=======
 /// The force at coincident positions (r = 0) is κcd/δ along the reference bond, at any displacement; the
 /// other limits are 0.
 #[test]

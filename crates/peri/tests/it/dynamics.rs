@@ -194,9 +194,6 @@ fn energies_balance() {
         eprintln!(
             "step {part} of critical, damping {damping}, {} broken: work {:.3e}, kinetic {:.3e}, stored \
              {:.3e}, \
->>=======
-             {:.3e}, \
->>>>>>> theirs
              released {:.3e}, damped {:.3e} J; off by {worst:.1e}",
             last.broken, last.work, last.kinetic, last.stored, last.released, last.damped
         );
@@ -377,9 +374,6 @@ fn rigid_rotation() {
     eprintln!(
         "one free turn in {} steps: momentum {moved:.1e}, spin {turned:.1e}, energy {energy:.1e}, stretch \
          {:.5}",
->>=======
-         {:.5}",
->>>>>>> theirs
         state.counts.total_iterations,
         state.history.last().unwrap().largest_stretch
     );

@@ -1,6 +1,4 @@
 //! Loads without equilibrium: bodies torn by a force, free bodies, prescribed displacements that press a body
-=======
-//! Loads without equilibrium: bodies torn by a force, free bodies, prescribed displacements that press a body
 //! through itself.
 
 use crate::bodies::{Body, MODULUS, hold};
@@ -87,8 +85,7 @@ fn a_bond_holds_up_to_its_strength() {
 }
 
 /// A strip under a growing force, by both methods and both policies: the peak is within a step of that under
-/// a
-/// growing displacement; then the error, with the last finished step in the state.
+/// a growing displacement; then the error, with the last finished step in the state.
 #[test]
 fn torn_by_a_force() {
     let steps = 24;

@@ -1,6 +1,4 @@
 //! Pressure filter: the checks of all materials, unchanged uniform states, and the roughness at corners of
-=======
-//! Pressure filter: the checks of all materials, unchanged uniform states, and the roughness at corners of
 //! rigid grips by an independent program.
 
 use crate::materials::battery;
@@ -65,8 +63,7 @@ fn a_homogeneous_deformation_is_left_as_it_is() {
 }
 
 /// Returns the rms difference of p/μ from the mean of the nearest neighbours, of a strip between rigid grips
-/// three layers
-/// deep, K/μ = 1000, stretched by a half in plane strain.
+/// three layers deep, K/μ = 1000, stretched by a half in plane strain.
 fn roughness(rows: usize, filter: bool) -> f64 {
     const GRIP: usize = 3;
     let length = rows + 2 * GRIP;

@@ -96,9 +96,6 @@ fn compare<const D: usize>(body: &Body<D>, size: f64, name: &str) {
                 error <= allowed,
                 "{name}, {}, particle {particle} at {:?}: {found:?} against {exact:?}, off by {:.1e} of \
                  {:.1e}",
->>=======
-                 {:.1e}",
->>>>>>> theirs
                 law.name(),
                 built.points[particle],
                 error,
@@ -189,11 +186,6 @@ fn paths_agree_on_a_tabulated_law() {
 /// Bodies whose particles touch every edge of the storage, at sizes that no tile of 16 sites or group of 8
 /// neighbours divides, in place of Miri, which cannot run vector kernels. (Valgrind 3.19 runs this test
 /// without errors, probably on the 256-bit kernels.)
->>=======
-/// Bodies whose particles touch every edge of the storage, at sizes that no tile of 16 sites or group of 8
-/// neighbours divides, in place of Miri, which cannot run vector kernels. (Valgrind 3.19 runs this test
-/// without errors, probably on the 256-bit kernels.)
->>>>>>> theirs
 #[test]
 fn thin_bodies_of_any_length() {
     let law = peri::potential::Law::ChainOffset.build(720.0, 1200.0, false).unwrap();

@@ -1,7 +1,4 @@
 //! Coulomb friction and rigid planes in explicit dynamics: closed forms of a particle, plain sums, balances.
->>=======
-//! Coulomb friction and rigid planes in explicit dynamics: closed forms of a particle, plain sums, balances.
->>>>>>> theirs
 
 use crate::bodies::{Body, MODULUS, Random, Slit, norm};
 use crate::dynamics::DENSITY;
@@ -43,11 +40,6 @@ fn off(row: &StepRecord) -> f64 {
 /// Particle of 1 kg on a plane inclined by `theta` with a penalty of 1e6 N/m, whose normal is rotated by 0.3
 /// rad from the axes. A run returns position and velocity along the plane, and the error of the energy
 /// balance, J.
->>=======
-/// Particle of 1 kg on a plane inclined by `theta` with a penalty of 1e6 N/m, whose normal is rotated by 0.3
-/// rad from the axes. A run returns position and velocity along the plane, and the error of the energy
-/// balance, J.
->>>>>>> theirs
 struct Incline {
     theta: f64,
     mu: f64,
@@ -158,9 +150,6 @@ fn belt_drags() {
 }
 
 /// A plane with velocity w hits a particle at rest, which leaves with 2w; the plane has done the work.
->>=======
-/// A plane with velocity w hits a particle at rest, which leaves with 2w; the plane has done the work.
->>>>>>> theirs
 #[test]
 fn plane_hits_a_particle() {
     let mut one = Body::<2>::solid([1, 1], 1.0, 3.015).build().lattice;
@@ -215,8 +204,7 @@ fn two_particles_of_peridigm() {
 }
 
 /// Friction between particles agrees with a plain sum over all pairs, for random velocities, slips and
-/// bounds;
-/// Σ V f = 0.
+/// bounds; Σ V f = 0.
 fn friction_of_a_heap<const D: usize>(cells: [usize; D]) {
     let body = Body::<D>::solid(cells, 0.3, 1.015);
     let built = body.build();
@@ -280,8 +268,7 @@ fn friction_is_a_plain_sum() {
 }
 
 /// Two halves of a sheet collide obliquely over a moving rough plane: equal bits on any number of threads,
-/// and from
-/// a state saved while they touch.
+/// and from a state saved while they touch.
 #[test]
 fn neither_threads_nor_restarts_change_a_bit() {
     let mut body = Body::<2>::solid([66, 66], 1.0, 3.015);
@@ -344,9 +331,6 @@ fn neither_threads_nor_restarts_change_a_bit() {
 }
 
 /// Invalid planes and coefficients of friction are refused.
->>=======
-/// Invalid planes and coefficients of friction are refused.
->>>>>>> theirs
 #[test]
 fn refuses() {
     let one = Body::<2>::solid([1, 1], 1.0, 3.015).build().lattice;
@@ -375,9 +359,6 @@ fn refuses() {
 }
 
 /// A plane through the middle of a body drives its halves apart; everything stays finite.
->>=======
-/// A plane through the middle of a body drives its halves apart; everything stays finite.
->>>>>>> theirs
 #[test]
 fn plane_through_a_body() {
     let mut built = Body::<2>::solid([12, 12], 1.0, 3.015).build();

@@ -1,6 +1,5 @@
 //! Stress measures with weights that sum to 1: patch test up to free edges, complete distribution of bonds,
-//! balance of
-//! momentum, and reference definitions.
+//! balance of momentum, and reference definitions.
 
 use crate::bodies::{Body, BondPair, Built, MODULUS, Random, fit, norm, scatter, stretch_range};
 use peri::bonds::{BodyGeometry, BondDamage, BondForces, Overstretched};
@@ -52,12 +51,7 @@ fn strained<const D: usize>(points: &[[f64; D]]) -> Vec<[f64; D]> {
 
 /// Every particle of a body with a hole, also at edges and corners, has the stress of a complete family;
 /// returns the largest error of `hardy`.
-fn patch<const D: usize>(ratio: f64, cells: [usize; D], measures: &[Measure]) -> f64 {
->>=======
-/// Every particle of a body with a hole, also at edges and corners, has the stress of a complete family;
-/// returns the largest error of `hardy`.
 fn patch<const D: usize>(ratio: f64, cells: [usize; D], measures: &[StressMethod]) -> f64 {
->>>>>>> theirs
     let mut body = Body::<D>::solid(cells, 1.0, ratio);
     let far = 2.0 * ratio;
     let centre = cells.map(|c| c as f64 - far - 1.5);
@@ -108,8 +102,7 @@ fn any_strain_is_exact_up_to_free_edges() {
 }
 
 /// Results of `patch_test.py`: σ₁₁ in rows 0–3 below an edge along x over that inside, for the uniform strain
-/// of uniaxial stress
-/// along x.
+/// of uniaxial stress along x.
 #[test]
 fn rows_below_a_free_edge() {
     let built = Body::<2>::solid([41, 30], 1.0, 3.015).build();
@@ -321,8 +314,7 @@ fn measures_are_their_definitions() {
 }
 
 /// div P is the average of the force density by the window: Eqs (2.11), (2.12) for the cell's window of
-/// Lehoucq
-/// and Silling, and for the spline.
+/// Lehoucq and Silling, and for the spline.
 #[test]
 fn divergence_is_the_average_over_the_window() {
     let (_, built, pairs, u) = smooth();
@@ -355,8 +347,6 @@ fn divergence_is_the_average_over_the_window() {
     }
 }
 
-/// Fields do not depend on memory beside the rows of a body: a body in a larger box of cells has equal
-=======
 /// Fields do not depend on memory beside the rows of a body: a body in a larger box of cells has equal
 /// fields.
 #[test]

@@ -1,7 +1,4 @@
 //! Impact of bodies by velocity Verlet: the closed form of two particles, momentum, energy, Newton's cradle.
->>=======
-//! Impact of bodies by velocity Verlet: the closed form of two particles, momentum, energy, Newton's cradle.
->>>>>>> theirs
 
 use crate::bodies::{Body, MODULUS, Slit, hold};
 use crate::dynamics::DENSITY;
@@ -143,8 +140,7 @@ fn newtons_cradle() {
 }
 
 /// Two halves of a sheet collide obliquely: equal bits on any number of threads, and from a state saved while
-/// they
-/// touch.
+/// they touch.
 #[test]
 fn neither_threads_nor_restarts_change_a_bit() {
     let mut body = Body::<2>::solid([66, 66], 1.0, 3.015);

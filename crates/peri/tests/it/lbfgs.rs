@@ -109,9 +109,6 @@ fn plate_with_a_hole() {
         eprintln!(
             "plate, dx = {spacing}: {} and {} force evaluations, a factor of {ratio:.1}; {middle:.2} and \
              {:.2} s",
->>=======
-             {:.2} s",
->>>>>>> theirs
             fast.counts.evaluations,
             slow.counts.evaluations,
             start.elapsed().as_secs_f64() - middle

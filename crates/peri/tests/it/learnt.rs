@@ -68,8 +68,7 @@ fn thickness(law: &Surrogate, mut c: Voigt) -> f64 {
 }
 
 /// Returns the largest distance of P = FS from that of the law in any particle, over its norm, and the
-/// largest force at
-/// rest over μV/Δx.
+/// largest force at rest over μV/Δx.
 fn distance<const D: usize>(
     law: &Surrogate,
     space: Space,

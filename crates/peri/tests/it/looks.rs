@@ -38,9 +38,6 @@ fields = false
 "#;
 
 /// A body rotated by θ = 0.3 about the origin has a rotation of 0.3, no strains and no forces.
->>=======
-/// A body rotated by θ = 0.3 about the origin has a rotation of 0.3, no strains and no forces.
->>>>>>> theirs
 #[test]
 fn a_rotation_is_seen_as_one() {
     let directory = tempfile::tempdir().unwrap();
@@ -64,9 +61,6 @@ displacement_field = [\"(cos(0.3) - 1)*x - sin(0.3)*y\", \"sin(0.3)*x + (cos(0.3
 }
 
 /// A homogeneous strain prescribed at the rim reaches the inside (Cauchy–Born), and marks measure it.
->>=======
-/// A homogeneous strain prescribed at the rim reaches the inside (Cauchy–Born), and marks measure it.
->>>>>>> theirs
 #[test]
 fn a_strain_between_marks() {
     let directory = tempfile::tempdir().unwrap();
@@ -84,11 +78,8 @@ displacement_field = [\"0.02*x\", \"-0.01*y\"]\n",
         );
     }
     scene += "[solver]\ntolerance = 1e-10\n[[probe]]\nname = \"along\"\ntrack = \"strain\"\nfrom = [\"31 \
-=======
-    scene += "[solver]\ntolerance = 1e-10\n[[probe]]\nname = \"along\"\ntrack = \"strain\"\nfrom = [\"31 \
         mm\", \"1 mm\"]\nto = [\"51 mm\", \"1 mm\"]
-[[probe]]\nname = \"across\"\ntrack = \"strain\"\nfrom = [\"41 mm\", \"-5 mm\"]\n\
-        to = [\"41 mm\", \"5 \
+[[probe]]\nname = \"across\"\ntrack = \"strain\"\nfrom = [\"41 mm\", \"-5 mm\"]\nto = [\"41 mm\", \"5 \
 mm\"]\n";
     let finished = solve(&scene, directory.path());
     assert!((value(&finished, "along") / 0.02 - 1.0).abs() < 1e-8);
@@ -100,10 +91,6 @@ mm\"]\n";
 fn loads_follow_a_factor() {
     let directory = tempfile::tempdir().unwrap();
     let scene = format!(
-        "{SHEET}\n[[boundary]]\nname = \"all\"\nmin = [\"0 mm\", \"-20 mm\"]\nmax = [\"80 mm\", \"20 \
-         mm\"]\ndisplacement = [\"2 mm\", \"0 mm\"]
-[solver]\nmethod = \"verlet\"\n[dynamics]\ndensity = \"1 g/cm^3\"\nend_time = \"3 ms\"\nrecords = 3\nfactor \
-=======
         "{SHEET}\n[[boundary]]\nname = \"all\"\nmin = [\"0 mm\", \"-20 mm\"]\nmax = [\"80 mm\", \"20 \
          mm\"]\ndisplacement = [\"2 mm\", \"0 mm\"]
 [solver]\nmethod = \"verlet\"\n[dynamics]\ndensity = \"1 g/cm^3\"\nend_time = \"3 ms\"\nrecords = 3\nfactor \
@@ -133,9 +120,6 @@ fn a_grid_is_a_box() {
         format!(
             "{}horizon = \"6.03 mm\"\ngrid = {{ min = [\"0 mm\", \"-20 mm\"], max = [\"80 mm\", \"20 mm\"], \
              cells = {cells} }}\n{}{ends}",
->>=======
-             cells = {cells} }}\n{}{ends}",
->>>>>>> theirs
             &SHEET[..from],
             &SHEET[to..]
         )
@@ -214,14 +198,10 @@ fn what_is_most_likely_not_meant() {
     std::fs::write(directory.path().join("points.csv"), format!("x,y,volume\n{points}")).unwrap();
     let cloud = format!(
         "version = 1\nprogram = \"peri\"\n[body]\nspace = \"plane-stress\"\nthickness = \"1 mm\"\nhorizon = \
-=======
-        "version = 1\nprogram = \"peri\"\n[body]\nspace = \"plane-stress\"\nthickness = \"1 mm\"\nhorizon = \
          \"6 mm\"\npoints = \"{}\"
 [material]\nyoungs_modulus = \"1 MPa\"\nlaw = \"linear\"\n[[boundary]]\nside = \"x-\"\nlayers = \
-1\n\
-        displacement = [\"0 mm\", \"0 mm\"]
-[[boundary]]\nmin = [\"37 mm\", \"-1 mm\"]\nmax = [\"39 mm\", \"30 mm\"]\n\
-        displacement = [\"1 mm\", \"0 \
+1\ndisplacement = [\"0 mm\", \"0 mm\"]
+[[boundary]]\nmin = [\"37 mm\", \"-1 mm\"]\nmax = [\"39 mm\", \"30 mm\"]\ndisplacement = [\"1 mm\", \"0 \
 mm\"]\n",
         directory.path().join("points.csv").display()
     );
@@ -324,8 +304,6 @@ fn examples_of_the_guide_read_the_last_step() {
     assert!(tail.contains("fields = false"));
     let scene = format!(
         "{}{fields}[[boundary]]\nside = \"x-\"\ndisplacement = [\"0 mm\", \"0 mm\"]\n[[boundary]]\nside = \
-=======
-        "{}{fields}[[boundary]]\nside = \"x-\"\ndisplacement = [\"0 mm\", \"0 mm\"]\n[[boundary]]\nside = \
          \"x+\"\ndisplacement = [\"6 mm\", \"0 mm\"]\n[solver]\nsteps = 3\n",
         head.replace("\"2 mm\"", "\"5 mm\"")
             .replace("\"0 mm\"", "\"-40 mm\"")
@@ -361,9 +339,6 @@ fn examples_of_the_guide_read_the_last_step() {
             eprintln!(
                 "skipped: {python} has no {module} (`pip install {module}`, or name a Python with it in \
                  POLY_VTK_PYTHON)"
->>=======
-                 POLY_VTK_PYTHON)"
->>>>>>> theirs
             );
             continue;
         }

@@ -12,10 +12,6 @@ use peri::solver::{
 };
 
 /// Builds the response of a material in a body.
-pub type Make<'m, const D: usize> = &'m dyn Fn(&dyn Bonds<D>) -> Box<dyn Response<D> + 'm>;
-
-=======
-/// Builds the response of a material in a body.
 pub type Make<'m, const D: usize> = &'m dyn Fn(&dyn Bonds<D>) -> Box<dyn SolverMaterial<D> + 'm>;
 
 /// Body under test: bonds, the response of a material, and positions.

@@ -103,8 +103,6 @@ fn any_material() {
 }
 
 /// A law of the caller at any scale equals the named law of its shape, and so does the stretch of a fracture
-=======
-/// A law of the caller at any scale equals the named law of its shape, and so does the stretch of a fracture
 /// energy.
 #[test]
 fn a_law_of_the_caller() {

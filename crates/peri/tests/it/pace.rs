@@ -1,6 +1,4 @@
 //! Time step of explicit dynamics of solids: a bound of the largest frequency at any stretch and with broken
-=======
-//! Time step of explicit dynamics of solids: a bound of the largest frequency at any stretch and with broken
 //! bonds, and steps that follow it through stretching, tearing, crushing and back.
 
 use crate::bodies::{Random, hold};
@@ -153,9 +151,6 @@ fn pulled<const D: usize, M: Material<D> + 'static>(name: &str, cells: [usize; D
     println!(
         "{name}: {} steps, {} forces, {} bounds, {} searches, stretch {most:.2}, energies off by \
          {worst:.1e}, step {:.4} of {:.4} at rest",
->>=======
-         {worst:.1e}, step {:.4} of {:.4} at rest",
->>>>>>> theirs
         state.counts.total_iterations,
         state.counts.evaluations,
         state.motion.limits.bounds,
@@ -229,9 +224,6 @@ fn torn_solids_keep_a_stable_step() {
     println!(
         "torn: {} steps, {} forces, {} bounds, {} searches, {} broken, energies off by {off:.1e} of {:.3}, \
          step {:.2e} of {:.2e} at rest",
->>=======
-         step {:.2e} of {:.2e} at rest",
->>>>>>> theirs
         one.counts.total_iterations,
         one.counts.evaluations,
         one.motion.limits.bounds,

@@ -59,8 +59,7 @@ fn parts<const D: usize>(operations: &[Operation<D>]) -> Vec<usize> {
 }
 
 /// Parts counted by hand: gaps of one spacing and of a hundredth, round shapes, points and edges of contact,
-/// a sleeve around a
-/// shaft.
+/// a sleeve around a shaft.
 #[test]
 fn parts_that_do_not_touch() {
     let blocks = |gap: f64| [boxed([0.0; 2], [8.0, 5.0]), boxed([0.0, 5.0 + gap], [8.0, 10.0 + gap])];
@@ -248,9 +247,6 @@ stop_below = 0.02
 
 /// A strip of 20 mm² breaks in its weak layer at E (λ − 1) A = 2.0 N, λ = 1.05; without the layer it carries
 /// more than twice that. Layers of one spacing, of a tenth between two columns of particles, two layers, and
-=======
-/// A strip of 20 mm² breaks in its weak layer at E (λ − 1) A = 2.0 N, λ = 1.05; without the layer it carries
-/// more than twice that. Layers of one spacing, of a tenth between two columns of particles, two layers, and
 /// an oblique staircase.
 #[test]
 fn weak_layers_break_at_their_own_strength() {
@@ -259,9 +255,6 @@ fn weak_layers_break_at_their_own_strength() {
         format!(
             "{{ shape = {{ add = \"box\", min = [\"{x} mm\", \"-5 mm\"], max = [\"{end} mm\", \"5 mm\"] }}, \
              critical = {{ stretch = {stretch} }} }}"
->>=======
-             critical = {{ stretch = {stretch} }} }}"
->>>>>>> theirs
         )
     };
     let layers = [
@@ -350,8 +343,6 @@ displacement = ["0 mm", "1 mm"]
     };
     let two = |x: f64, y: f64| {
         strip(&format!(
-            "{{ from = [\"-1 mm\", \"10 mm\"], to = [\"5 mm\", \"10.2 mm\"] }}, {{ from = [\"{x} mm\", \"{y} \
-=======
             "{{ from = [\"-1 mm\", \"10 mm\"], to = [\"5 mm\", \"10.2 mm\"] }}, {{ from = [\"{x} mm\", \"{y} \
              mm\"], to = [\"11 mm\", \"9.9 mm\"] }}"
         ))

@@ -157,8 +157,7 @@ fn a_bimetal_strip() {
 }
 
 /// Returns σ_xx over σ₀ in the rows of the middle of a free strip with the ε* = −S:σ of a stress σ_xx =
-/// σ₀(3s² −
-/// 1)/2, s from −1 to 1 across it.
+/// σ₀(3s² − 1)/2, s from −1 to 1 across it.
 fn handed_over([nx, ny]: [usize; 2]) -> Vec<f64> {
     const STRESS: f64 = 1e-5;
     let mut built = Body::<2>::solid([nx, ny], 1.0, 3.015).build();
@@ -215,8 +214,7 @@ fn a_stress_is_handed_over() {
 }
 
 /// A free body with a uniform ε* stretched beyond its rest breaks like one without prestrain: λ/λ* > λ_c,
-/// from
-/// both ends.
+/// from both ends.
 #[test]
 fn prestrained_bonds_break() {
     let built = Body::<2>::solid([8, 7], 0.1, 3.015).build();

@@ -1,6 +1,4 @@
 //! Bodies without reactions: moved by one grip, cut in two, without loads. A residual over reactions alone
-=======
-//! Bodies without reactions: moved by one grip, cut in two, without loads. A residual over reactions alone
 //! would never converge.
 
 use crate::bodies::{Body, MODULUS, hold};

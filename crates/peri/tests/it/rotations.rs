@@ -1,6 +1,4 @@
 //! Boundaries that rotate along the arc: a twisted bar against torsion of a neo-Hookean cylinder, bodies that
-=======
-//! Boundaries that rotate along the arc: a twisted bar against torsion of a neo-Hookean cylinder, bodies that
 //! rotate as a whole.
 
 use harness::case::{Case, Options, Run};
@@ -81,8 +79,6 @@ fn a_bar_twisted_along_the_arc() {
         let (low, high) = (z - 0.5, z + 0.5);
         format!(
             "[[probe]]\nname = \"{name}\"\ntrack = \"rotation\"\naxis = \"z\"\nmin = [\"-6 mm\", \"-6 mm\", \
-=======
-            "[[probe]]\nname = \"{name}\"\ntrack = \"rotation\"\naxis = \"z\"\nmin = [\"-6 mm\", \"-6 mm\", \
              \"{low} mm\"]\nmax = [\"6 mm\", \"6 mm\", \"{high} mm\"]\n"
         )
     };
@@ -127,8 +123,6 @@ displacement = [\"0 mm\", \"0 mm\", \"free\"]";
     assert!(value(&free, "end") > 1e-5, "{} m", value(&free, "end"));
 }
 
-/// A body follows a full rotation of a region without stretching any bond in any step, and ends in its
-=======
 /// A body follows a full rotation of a region without stretching any bond in any step, and ends in its
 /// initial position.
 #[test]

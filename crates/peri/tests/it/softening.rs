@@ -144,8 +144,6 @@ fn energies_at_a_strength() {
 }
 
 /// Pulls a strip at small strains and returns the peak of the mean stress over the strength. Bonds that end
-=======
-/// Pulls a strip at small strains and returns the peak of the mean stress over the strength. Bonds that end
 /// in the middle row have the integrity `weak` at the start.
 fn strip(rows: usize, ductility: f64, weak: f64) -> f64 {
     let spacing = 1.0 / rows as f64;
@@ -259,9 +257,6 @@ fn a_softening_strip_tears() {
         eprintln!(
             "moving {moving}: {} broken, up to {soft} softened, {} evaluations, {} states; work {:.4}, \
              stored {:.4}, released {:.4}, kinetic {:.4}",
->>=======
-             stored {:.4}, released {:.4}, kinetic {:.4}",
->>>>>>> theirs
             last.broken,
             whole.counts.evaluations,
             saved.len(),

@@ -104,8 +104,7 @@ impl<const D: usize> Block<D> {
     }
 
     /// Returns the largest differences of f, F, W and I from the program, over the largest of each, and ΣE
-    /// over all
-    /// particles.
+    /// over all particles.
     fn compare<L: PointLaw<D> + Clone>(
         &mut self,
         solid: &NonlocalSolid<L>,
@@ -324,8 +323,7 @@ fn a_homogeneous_deformation_is_exact_everywhere() {
 /// A strip bonded to plates, w/h = 4, pressed by 1 %: finite elements (`docs/reference/eight_chain/strip.py`)
 /// have 2.913μ at K/μ = 5/3 and 16.49μ at 100, where all of the stiffness comes from the volume. Plates of
 /// particles are compliant over a horizon, so that errors are of first order: 12.6 % and 6.9 % at 16
-/// particles
-/// over the height.
+/// particles over the height.
 #[test]
 fn a_bonded_strip_is_stiff_because_it_keeps_its_volume() {
     let (height, shear) = (8e-3, 0.4e6);
@@ -379,9 +377,6 @@ fn laws_of_another_dimension_are_refused() {
 }
 
 /// Iterations grow as the root of the bulk modulus, which the coarse level includes.
->>=======
-/// Iterations grow as the root of the bulk modulus, which the coarse level includes.
->>>>>>> theirs
 #[test]
 fn iterations_at_large_bulk_moduli() {
     let iterations = |bulk: f64| {

@@ -173,8 +173,7 @@ fn patch_test_in_space_at_a_large_horizon() {
 }
 
 /// Returns stresses in rows below a free surface: hardy over the whole ball, hardy over the ball inside the
-/// body,
-/// one-point.
+/// body, one-point.
 fn check_surface<const D: usize>(ratio: f64, depth: usize, cells_tolerance: f64, rows: &[[f64; 3]]) {
     let width = 2 * (2.0 * ratio) as usize + 1;
     let mut cells = [width; D];
@@ -235,8 +234,7 @@ fn free_surface_in_space() {
 }
 
 /// The volume of the ball inside the body, by its share of particles, is equal on both paths, in bodies of
-/// any
-/// thickness.
+/// any thickness.
 #[test]
 fn ball_inside_thin_bodies() {
     for width in [1, 3, 6, 20] {
@@ -266,8 +264,7 @@ fn ball_inside_thin_bodies() {
 }
 
 /// Returns P by definition: over all pairs, force ⊗ ξ × fraction of the bond inside the ball about `at`, over
-/// the
-/// ball's volume.
+/// the ball's volume.
 fn hardy_sum<const D: usize>(
     body: &Body<D>,
     points: &[[f64; D]],
@@ -396,8 +393,7 @@ fn divergence_is_the_average_force() {
 }
 
 /// Deformation gradients of the lattice (by vectors) and of a cloud (by bonds) agree, with a hole, cracks and
-/// a
-/// volume correction.
+/// a volume correction.
 #[test]
 fn deformation_gradients_of_torn_bodies() {
     fn check<const D: usize>(cells: [usize; D]) {

@@ -71,9 +71,6 @@ fn plate(spacing: f64, volume: VolumeCorrection, surface: bool) -> [f64; 3] {
     eprintln!(
         "dx = {spacing}, {volume:?}, surface {surface}: strain {:.4}, hardy {hardy:.3}, one-point \
          {one_point:.3}, {} its",
->>=======
-         {one_point:.3}, {} its",
->>>>>>> theirs
         strain / stress,
         state.counts.total_iterations
     );

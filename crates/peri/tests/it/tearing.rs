@@ -154,8 +154,7 @@ fn softened_bonds() {
 }
 
 /// Forces of a body with softening bonds are slopes of its energy, in the kernels of a lattice and of a
-/// cloud, and
-/// sum to zero.
+/// cloud, and sum to zero.
 #[test]
 fn forces_of_soft_bonds_are_slopes() {
     let lattice = sheet(3.015, VolumeCorrection::None);
@@ -285,10 +284,6 @@ fn areas_of_cracks() {
 
 /// Returns the output of `peri check`.
 fn check_output(text: &str, folder: &Path) -> String {
->>=======
-/// Returns the output of `peri check`.
-fn check_output(text: &str, folder: &Path) -> String {
->>>>>>> theirs
     let source = Source::new(folder.join("scene.toml"), text);
     let scene = source.parse::<Scene>().unwrap_or_else(|error| panic!("{}", error.render()));
     explanation(&source, &scene, false).unwrap_or_else(|error| panic!("{error}")).join("\n")
@@ -339,18 +334,11 @@ fn causes_of_other_energies_are_named() {
             "\"-12 mm\"], max = [\"80 mm\", \"12 mm\"]",
             "\"-12 mm\", \"0 mm\"], max = [\"80 mm\", \"12 \
             mm\", \"6 mm\"]",
->>=======
-            "\"-12 mm\", \"0 mm\"], max = [\"80 mm\", \"12 \
-            mm\", \"6 mm\"]",
->>>>>>> theirs
         )
         .replace(
             "from = [\"-1 mm\", \"0 mm\"], to = [\"40 mm\", \"0 mm\"]",
             "from = [\"-1 mm\", \"0 mm\", \
             \"-1 mm\"], to = [\"40 mm\", \"0 mm\", \"-1 mm\"], and = [\"-1 mm\", \"0 mm\", \"7 mm\"]",
->>=======
-            \"-1 mm\"], to = [\"40 mm\", \"0 mm\", \"-1 mm\"], and = [\"-1 mm\", \"0 mm\", \"7 mm\"]",
->>>>>>> theirs
         )
         .replace("[\"0 mm\", \"0 mm\"]", "[\"0 mm\", \"0 mm\", \"free\"]")
         .replace("[\"0 mm\", \"0.4 mm\"]", "[\"0 mm\", \"0.4 mm\", \"free\"]");

@@ -22,9 +22,6 @@ fn steps_beyond_the_critical_are_refused() {
     eprintln!(
         "critical step {critical_step:.4e}, all stretches {covered_step:.4e}, Gershgorin \
          {gershgorin_step:.4e} s, {} forces",
->>=======
-         {gershgorin_step:.4e} s, {} forces",
->>>>>>> theirs
         state.counts.evaluations
     );
     assert!(gershgorin_step <= covered_step && covered_step <= critical_step);

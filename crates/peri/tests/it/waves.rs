@@ -166,8 +166,7 @@ fn wave_in_a_thin_bar() {
 }
 
 /// Returns the speed of a crack tip over the Rayleigh speed, in a notched strip stretched by ε between its
-/// long edges: the energy ½C₁₁ε²H of a column ahead of the
-/// crack is `drive` times the fracture energy.
+/// long edges: the energy ½C₁₁ε²H of a column ahead of the crack is `drive` times the fracture energy.
 fn crack_speed(rows: usize, drive: f64, law: Law) -> f64 {
     let (height, ratio, stretch) = (1.0, 3.015, 0.01);
     let spacing = height / rows as f64;
@@ -230,9 +229,6 @@ fn crack_speed(rows: usize, drive: f64, law: Law) -> f64 {
     eprintln!(
         "{rows} rows: {speed:.3} c_R, in parts {parts:.3?}; {} broken, {} steps, {} forces, strain {:.3} of \
          critical; \
->>=======
-         critical; \
->>>>>>> theirs
          released {took:.2} G a length, energies off by {off:.1e}",
         state.fracture.broken,
         state.counts.total_iterations,
