@@ -197,7 +197,7 @@ fn a_print_on_a_small_screen() {
     choose(&browser, "fields", "crystallinity");
     choose(&browser, "axis", "y");
     browser.wait(&format!("document.body.dataset.triangles !== '{whole}'"));
-    assert_ne!(shown(&browser, "grey"), "0", "glass has no crystallinity");
+    assert_ne!(shown_values(&browser, "grey"), "0", "glass has no crystallinity");
     browser.picture("print-cut.txt");
     browser.press("#cut", "\u{e010}");
     browser.wait("document.body.dataset.triangles === '0'");

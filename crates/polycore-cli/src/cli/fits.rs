@@ -280,7 +280,7 @@ fn summary(case: &FitCase, all: &[TableFits], report: &Report) -> String {
 }
 
 /// Returns the table of the errors of all laws on all tables.
-fn errors(case: &Case, all: &[Set]) -> String {
+fn errors(case: &FitCase, all: &[TableFits]) -> String {
     let mut text =
         "rms of the nominal stress, over the measured stresses (their number in brackets); k: parameters\n"
             .to_owned();
@@ -303,7 +303,7 @@ fn errors(case: &Case, all: &[Set]) -> String {
 }
 
 /// Returns the laws that failed and the block of the best law, by table.
-fn remarks(all: &[Set]) -> String {
+fn remarks(all: &[TableFits]) -> String {
     let mut text = String::new();
     for set in all {
         for (law, why) in &set.failed {
