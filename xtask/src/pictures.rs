@@ -9,9 +9,9 @@ use harness::report::{FILE_NAME, Report};
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
 use serde::Deserialize;
 
-use crate::stamp::{Stamp, sources};
+use crate::stamp::{SourceStamp, sources};
 use crate::table::print;
-use crate::workspace::Workspace;
+use crate::workspace::Repository;
 
 mod compose;
 mod fill;
@@ -133,7 +133,7 @@ impl List {
 }
 
 /// Draws what is missing or stale, or all; returns true.
-pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
+pub fn run(workspace: &Repository, options: &Options) -> Result<bool> {
     let root = workspace.root();
     let list = List::read(root)?;
     let mut stamps = stamps(root)?;
@@ -152,7 +152,7 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
         } else if let Some(block) = list.table.iter().find(|block| block.key() == *key) {
             write(root, block, &results)?;
         }
-        stamps.insert(key.clone(), Stamp::new(root, &list.sources(root, cases)?)?);
+        stamps.insert(key.clone(), SourceStamp::new(root, &list.sources(root, cases)?)?);
         print(&format!("{key}\n"));
     }
     include::update(root, &crate::tidy::tracked(root)?)?;
@@ -182,7 +182,7 @@ pub fn findings(root: &Path, files: &[PathBuf]) -> Result<Vec<String>> {
     Ok(findings)
 }
 
-fn stamps(root: &Path) -> Result<BTreeMap<String, Stamp>> {
+fn stamps(root: &Path) -> Result<BTreeMap<String, SourceStamp>> {
     match fs::read_to_string(root.join(STAMPS)) {
         Ok(text) => toml::from_str(&text).into_diagnostic().wrap_err(STAMPS),
         Err(_) => Ok(BTreeMap::new()),
@@ -199,7 +199,7 @@ fn program(root: &Path, scene: &Path) -> Result<String> {
 }
 
 /// Runs a scene and returns the folder of its results.
-fn solve(workspace: &Workspace, options: &Options, name: &str, scene: &Path) -> Result<PathBuf> {
+fn solve(workspace: &Repository, options: &Options, name: &str, scene: &Path) -> Result<PathBuf> {
     let program = program(workspace.root(), scene)?;
     let executable = match &options.from {
         Some(folder) => folder.join(&program).with_extension(std::env::consts::EXE_EXTENSION),
@@ -276,7 +276,7 @@ mod tests {
         fs::remove_file(root.path().join("docs/b.png")).expect("removed");
         let list = List::read(root.path()).expect("a list");
         let sources = list.sources(root.path(), &["plate"]).expect("sources");
-        let stamp = Stamp::new(root.path(), &sources).expect("a stamp");
+        let stamp = SourceStamp::new(root.path(), &sources).expect("a stamp");
         let stamps = BTreeMap::from([("docs/a.png".to_owned(), stamp)]);
         write(STAMPS, &toml::to_string(&stamps).expect("text"));
         assert_eq!(found(), [""; 0]);
