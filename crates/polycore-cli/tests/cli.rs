@@ -366,7 +366,7 @@ fn tables_of_laboratories() {
         (strains, "", &["bar.csv", "line 2: column 1, `stretch`", "is this a strain?"][..]),
         ("eps;sigma\n0.5;0.79\n", "", &["unit of column 2, `sigma`", "stress_unit"]),
         ("eps;sigma/MPa\n0.5;0,79\n", "", &["line 2", "decimal"]),
-        ("Force (N),Extension (mm)\n1,2\n", "", &["divided by the undeformed area"]),
+        ("Force (N),Extension (mm)\n1,2\n", "", &["divide forces by the undeformed area"]),
     ] {
         let (_folder, result) = fitted(table, keys);
         let error = text(&result.stderr).replace(['\n', '│'], " ");

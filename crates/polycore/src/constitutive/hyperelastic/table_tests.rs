@@ -180,7 +180,7 @@ fn bad_tables_are_refused_with_the_line() {
         ("strain [mm],stress [MPa]\n1,0.1\n", "unit of column 1"),
         ("strain,true stress [MPa]\n0.1,0.1\n", "`strain = \"engineering\"` or"),
         ("true strain,stress [MPa]\n0.1,0.1\n", "`stress = \"nominal\"` or"),
-        ("strain,stress [MPa]\n10,0.1\n100,1\n", "in per cent the heading is `strain [%]`"),
+        ("strain,stress [MPa]\n10,0.1\n100,1\n", "for per cent use the heading `strain [%]`"),
         ("strain,stress [MPa]\n1,0\n1.5,0.4\n2,0.6\n", "is this a stretch?"),
         ("stretch,nominal_MPa\n0.05,0.057\n0.1,0.109\n0.6,0.48\n1.2,0.797\n", "is this a strain?"),
         ("stretch,nominal_MPa\n0.05,0.057\n0.1,0.109\n0.6,0.48\n", "is this a strain?"),
