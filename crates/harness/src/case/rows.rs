@@ -297,7 +297,7 @@ mod tests {
         let text = rows.short_text(100);
         assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
         assert!(text.contains("run-14") && text.contains("… 5 more runs in the table"), "{text}");
-        assert!(text.contains("_value_2 [N]") && text.contains("… 6 more columns in the table"), "{text}");
+        assert!(text.contains("_value_1 [N]") && text.contains("… 7 more columns in the table"), "{text}");
         rows.rows.truncate(1);
         rows.columns = vec!["a_long_name_of_a_value_3".into()];
         assert_eq!(rows.short_text(100), rows.text());
