@@ -155,6 +155,10 @@ impl<const D: usize> Response<D> for Kernels<'_> {
         false
     }
 
+    fn is_fitted_law(&self) -> bool {
+        self.material.end.is_none()
+    }
+
     fn force(
         &self,
         bonds: &dyn Bonds<D>,

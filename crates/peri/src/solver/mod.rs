@@ -31,6 +31,8 @@ mod system;
 mod time_step;
 mod turn;
 mod verlet;
+#[cfg(feature = "gpu")]
+mod verlet_device;
 mod verlet_friction;
 mod verlet_step;
 

@@ -2,7 +2,7 @@
 
 use super::values::{plain, positive, ratio};
 use super::variant::{Variant, variants};
-use super::{HORIZON_RATIO, Method, Parameter, Probe, Scene, Track};
+use super::{DeviceChoice, Dynamics, HORIZON_RATIO, Method, Parameter, Precision, Probe, Scene, Track};
 use crate::calibrate::{Calibration, Space};
 use crate::solver::Policy;
 use crate::stress::Measure;
@@ -120,6 +120,7 @@ fn dynamics(source: &Source, scene: &Scene) -> Result<(), SceneError> {
                 let allowed = "\"double\"; \"mixed\" is for bond laws in bodies of shapes";
                 return Err(source.error("dynamics.precision", format!("\"mixed\" of {what}"), allowed));
             }
+            device(source, dynamics)?;
             if let Some(factor) = &dynamics.factor {
                 if dynamics.ramp.is_some() {
                     return Err(source.error(
@@ -156,6 +157,20 @@ fn dynamics(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         }
         None => Ok(()),
     }
+}
+
+fn device(source: &Source, dynamics: &Dynamics) -> Result<(), SceneError> {
+    let (device, precision) = (dynamics.device, dynamics.precision);
+    let found = match (device, precision) {
+        (DeviceChoice::Cpu, Precision::Single) => "\"single\" on the processor",
+        (DeviceChoice::Gpu, Precision::Mixed) => "\"mixed\" on a graphics card",
+        _ => return Ok(()),
+    };
+    let allowed = match device {
+        DeviceChoice::Cpu => "\"double\" or \"mixed\"; \"single\" is for `device = \"gpu\"`",
+        _ => "\"double\" or \"single\"",
+    };
+    Err(source.error("dynamics.precision", found, allowed))
 }
 
 fn output(source: &Source, scene: &Scene) -> Result<(), SceneError> {
