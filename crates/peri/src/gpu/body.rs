@@ -93,8 +93,8 @@ impl<const D: usize> DeviceBody<D> {
             stressed: false,
             held: false,
             loaded: false,
-            tile: tuned("PERI_TILE", TILE),
-            unroll: tuned("PERI_UNROLL", 2),
+            tile: TILE,
+            unroll: 2,
         };
         let field = (D * sites) as u64 * precision.bytes();
         let words = 4 * (sites * form.bonds.div_ceil(32)) as u64;
@@ -139,7 +139,8 @@ impl<const D: usize> DeviceBody<D> {
             partial: empty(SUMS * threads),
             sums: empty(MOST_STEPS * SUMS * LANES),
             ranges: empty(ranges),
-            folded: empty(2 * FOLDED),
+            // kernels take the length of a list from its buffer
+            folded: empty(2 * (ranges / 2).min(FOLDED)),
             extremes: empty(2 * LANES),
             count: whole(&[0]),
             list: client.empty(4 * 2 * LISTED),
@@ -277,10 +278,6 @@ impl<const D: usize> DeviceBody<D> {
             Precision::Double => f64::from_bytes(&bytes).to_vec(),
         })
     }
-}
-
-fn tuned(name: &str, usual: usize) -> usize {
-    std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
 }
 
 /// Cubes of threads with `tile` particles each.
