@@ -42,8 +42,8 @@ pub struct LatticeBonds<const D: usize> {
     /// Interior value of the factors, part of each bond's weight; stored factors are relative to it.
     interior_factor: f64,
     kernel: Option<Box<dyn LatticeKernel<D>>>,
-    /// A law that only a table represents, and kθ.
-    table: Option<(KernelFit, f64)>,
+    /// The fitted law, and kθ.
+    law: Option<(KernelFit, f64)>,
     directed_bonds: u64,
     softening: SoftenedBonds,
     mixed: Option<Mixed<D>>,
@@ -116,7 +116,7 @@ impl<const D: usize> LatticeBonds<D> {
             even: true,
             interior_factor: 1.0,
             kernel: None,
-            table: None,
+            law: None,
             directed_bonds: 0,
             softening: SoftenedBonds::default(),
             mixed: None,
@@ -226,6 +226,12 @@ impl<const D: usize> LatticeBonds<D> {
         self.factors.is_none() && self.softening.bonds().is_empty()
     }
 
+    /// The fitted law and kθ, N/m⁶, where they are set.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn law(&self) -> Option<(&KernelFit, f64)> {
+        self.law.as_ref().map(|(fit, modulus)| (fit, *modulus))
+    }
+
     /// Input of lattice kernels for a displacement.
     pub(super) fn tiles<'a>(&'a self, displacement: &'a Field<D>) -> Tiles<'a, D> {
         Tiles {
@@ -247,7 +253,7 @@ impl<const D: usize> LatticeBonds<D> {
     ) {
         if let Some(kernel) = &self.kernel {
             kernel.run(&self.tiles(displacement), start, force, track);
-        } else if let Some((fit, modulus)) = &self.table {
+        } else if let Some((fit, modulus)) = &self.law {
             plain_force(self, fit, *modulus, displacement, start, force, track);
         }
     }
@@ -359,7 +365,7 @@ impl<const D: usize> BondForces<D> for LatticeBonds<D> {
             mixed.set_law(fit, &stencil, self.lattice.spacing);
         }
         self.kernel = lattice_kernel(fit, &stencil);
-        self.table = self.kernel.is_none().then(|| (fit.clone(), modulus));
+        self.law = Some((fit.clone(), modulus));
     }
 
     fn set_factors(&mut self, mut factors: Field<D>) {

@@ -37,7 +37,7 @@ pub use stencil::{Stencil, storage};
 pub use traits::{BodyGeometry, BondDamage, BondForces, BondKind, Bonds, Neighbour};
 
 #[cfg(feature = "gpu")]
-pub(crate) use rows::{StencilBond, scaled_laws};
+pub(crate) use rows::Rational;
 
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};

@@ -76,15 +76,20 @@ impl<const D: usize, const P: usize, const Q: usize> CloudKernel<D> for Compiled
 }
 
 /// q(e) = constant + e·M(e)/(1 + Σ bₖ eᵏ⁺¹), the form of all kernels.
-struct Rational {
-    clamp: [f64; 2],
-    constant: f64,
-    numerator: Vec<f64>,
-    denominator: Vec<f64>,
+pub struct Rational {
+    /// Least and greatest e, beyond which q is constant.
+    pub clamp: [f64; 2],
+    /// q(0).
+    pub constant: f64,
+    /// Coefficients of M.
+    pub numerator: Vec<f64>,
+    /// b.
+    pub denominator: Vec<f64>,
 }
 
 impl Rational {
-    fn new(fit: &KernelFit) -> Option<Self> {
+    /// Form of a fitted law; `None` for a table.
+    pub fn new(fit: &KernelFit) -> Option<Self> {
         let KernelFit { numerator, denominator, stress_free, .. } = fit;
         if numerator.is_empty() {
             return None;
@@ -103,17 +108,17 @@ impl Rational {
 }
 
 /// Law of a bond of the stencil: coefficients in E = |ξ|² e, times the bond's stiffness; see [`StencilRow`].
-pub struct ScaledLaw {
+struct ScaledLaw {
     /// 1/|ξ|².
-    pub inverse_square: f64,
+    inverse_square: f64,
     /// Ends of the law in E.
-    pub clamp: [f64; 2],
+    clamp: [f64; 2],
     /// Value at E = 0.
-    pub constant: f64,
+    constant: f64,
     /// Scaled numerator.
-    pub numerator: Vec<f64>,
+    numerator: Vec<f64>,
     /// Scaled denominator beyond its leading 1.
-    pub denominator: Vec<f64>,
+    denominator: Vec<f64>,
 }
 
 impl Rational {
@@ -131,13 +136,6 @@ impl Rational {
             denominator: times(&self.denominator, &scale),
         }
     }
-}
-
-/// Scales the law to every bond of a stencil; `None` if the law is a table.
-#[cfg(feature = "gpu")]
-pub fn scaled_laws<const D: usize>(fit: &KernelFit, stencil: &[StencilBond<D>]) -> Option<Vec<ScaledLaw>> {
-    let law = Rational::new(fit)?;
-    Some(stencil.iter().map(|bond| law.scaled(bond)).collect())
 }
 
 fn padded<T: KernelReal, const N: usize>(values: &[f64]) -> [T; N] {

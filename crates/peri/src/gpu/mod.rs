@@ -1,31 +1,19 @@
-//! Lattices on a graphics card (feature `gpu`): forces and velocity Verlet with bonds that break, many steps without a copy to the host.
+//! Lattices on a graphics card (feature `gpu`): velocity Verlet with bonds that break.
 //!
-//! A [`Device`] is a card, or a program that does as one does; [`DeviceBody`] is a lattice on it, with the stencil, the fitted law and
+//! A [`Device`] is a card, or a program that stands for one; [`DeviceBody`] is a lattice on it, with the stencil, the fitted law and
 //! the bits of intact bonds of the host's kernel (see [`crate::potential::KernelFit`]). The kernels are written once, in Rust, and
 //! compiled for the device when they first run ([`cubecl`](https://docs.rs/cubecl)). Lengths are in spacings there and velocities in
 //! spacings a step, so that nothing leaves the range of single precision; stretches come from differences of displacements.
 //!
-//! ```no_run
-//! # use peri::{Error, bonds::{BodyGeometry, BondDamage, BondForces, LatticeBonds}, field::Field, potential::KernelFit};
-//! use peri::gpu::{Device, DeviceBody, Start};
-//! # fn run(mut bonds: LatticeBonds<3>, law: &KernelFit, modulus: f64, start: &Start<3>) -> Result<(), Error> {
-//! let device = Device::portable()?;
-//! let mut body = DeviceBody::new(&device, &bonds, law, modulus, Some(1.02))?;
-//! body.start(start)?;
-//! body.advance(1000)?;
-//! let (state, intact) = (body.state()?, body.intact()?);
-//! bonds.restore(&intact);
-//! # Ok(())
-//! # }
-//! ```
-//!
-//! What the kernels do not know is refused by name: laws that only a table represents, surface factors, softened bonds. Contact,
-//! body forces, damping and a watch on the time step are the host's ([`crate::solver::VelocityVerlet`]).
+//! [`VelocityVerlet::solve_on`](crate::solver::VelocityVerlet::solve_on) takes the steps of a [`System`](crate::solver::System) on a
+//! device: the host decides as it does without one, from sums of each step, and fetches fields for rows of the history only.
 
 mod body;
 mod kernels;
+mod steps;
 
-pub use body::{DeviceBody, Motion, Start};
+pub use body::{DeviceBody, DeviceLoads, MOST_STEPS};
+pub use steps::{DeviceStep, ListedBond, StepSums};
 
 use crate::error::Error;
 use cubecl::client::Client;
@@ -94,7 +82,12 @@ impl Device {
         Ok(Self { client, precision })
     }
 
-    /// What the device calls itself.
+    /// Whether it is a card, and no program that stands for one.
+    pub fn is_card(&self) -> bool {
+        self.client.properties().identity.physical.is_some()
+    }
+
+    /// Name that the device gives itself.
     pub fn name(&self) -> &str {
         &self.client.properties().identity.name
     }

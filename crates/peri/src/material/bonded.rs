@@ -157,6 +157,10 @@ impl<const D: usize> SolverMaterial<D> for Kernels<'_> {
         false
     }
 
+    fn is_fitted_law(&self) -> bool {
+        self.material.end.is_none()
+    }
+
     fn force(
         &self,
         bonds: &dyn Bonds<D>,

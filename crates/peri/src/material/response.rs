@@ -57,6 +57,11 @@ pub trait SolverMaterial<const D: usize>: Send + Sync {
     /// Returns true if forces of a particle depend on more than its own bonds.
     fn has_points(&self) -> bool;
 
+    /// Whether forces are those of the bonds' fitted law, and nothing else, as graphics cards evaluate them.
+    fn is_fitted_law(&self) -> bool {
+        false
+    }
+
     /// Computes the force densities, N/m³, of whole pieces from the site `start` on; tracks the stretches
     /// observed if asked.
     fn force(

@@ -66,7 +66,7 @@ impl<const D: usize> System<'_, D> {
     /// ends.
     pub fn break_bonds(&mut self, state: &mut State<D>) -> Vec<u32> {
         let mut softened = None;
-        let mut list = match self.breaking.as_ref().map(|breaking| &breaking.criterion) {
+        let list = match self.breaking.as_ref().map(|breaking| &breaking.criterion) {
             Some(&Criterion::Softening(law)) => {
                 let found = self.overloaded(state, law.onset);
                 // in dynamics forces follow at once
@@ -79,6 +79,16 @@ impl<const D: usize> System<'_, D> {
             }
             _ => self.beyond(state),
         };
+        self.sever(state, list, softened)
+    }
+
+    /// Severs bonds, and softens those on the way there; the sites of their ends.
+    pub(super) fn sever(
+        &mut self,
+        state: &mut State<D>,
+        mut list: Vec<Overstretched>,
+        softened: Option<Vec<Softened>>,
+    ) -> Vec<u32> {
         if list.is_empty() && softened.is_none() {
             return Vec::new();
         }

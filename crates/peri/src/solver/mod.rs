@@ -35,6 +35,8 @@ mod system;
 mod time_step;
 mod unsupported;
 mod verlet;
+#[cfg(feature = "gpu")]
+mod verlet_device;
 mod verlet_friction;
 mod verlet_step;
 

@@ -137,6 +137,13 @@ impl StretchLook {
         Self { stretches, slack: 0.0 }
     }
 
+    /// By how much stretches may change before [`Self::is_due`].
+    #[cfg(feature = "gpu")]
+    pub fn room(&self, fitted: [f64; 2], critical: Option<f64>) -> f64 {
+        let high = fitted[1].min(critical.unwrap_or(f64::INFINITY));
+        (self.stretches[0] - fitted[0]).min(high - self.stretches[1]) - self.slack
+    }
+
     /// Returns true if stretches may have left the fitted range or reached the critical one. A bond's stretch
     /// changes by no more than its ends' increments over its length.
     pub fn is_due(&self, fitted: [f64; 2], critical: Option<f64>) -> bool {

@@ -86,33 +86,14 @@ impl<const D: usize> Method<D> for VelocityVerlet {
         watch: &mut Watch<D>,
         finished: &mut StepCallback<D>,
     ) -> Result<(), Error> {
-        self.check()?;
-        if !state.motion.begun && system.course.is_none() {
-            system.refuse_inverted(&[1.0])?;
-        }
-        let volumes = volumes(system);
-        system.contact.iter_mut().for_each(Contact::end_friction);
-        if state.motion.begun {
-            system.move_planes(self.factor(system, state.motion.time).0, state.motion.time);
-            system.restore(state)?;
-            system.contact.iter_mut().for_each(|contact| contact.resume_friction(&state.contact.grips));
-        } else {
-            self.begin(system, state, &volumes)?;
-        }
+        let volumes = self.open(system, state)?;
         while state.step < self.records {
-            // the last of them is the end time to the bit
-            let end = self.end_time * ((state.step + 1) as f64 / self.records as f64);
-            if state.motion.steps.planned == 0 {
-                state.motion.plan(end);
-            }
+            let end = self.end_of_row(state);
             while state.motion.steps.taken < state.motion.steps.planned {
                 self.advance(system, state, &volumes, end)?;
-                watch(&self.status(state), state)?;
+                watch(&self.status(state, true), state)?;
             }
-            system.check_overlaps(state)?;
-            self.record(system, state);
-            state.step += 1;
-            (state.counts.iteration, state.counts.step_iterations, state.motion.steps.planned) = (0, 0, 0);
+            self.close_row(system, state)?;
             finished(&*system.bonds, state)?;
         }
         Ok(())
@@ -143,8 +124,53 @@ impl VelocityVerlet {
         }
     }
 
+    /// Begins, or continues, a run; volumes of all sites.
+    pub(super) fn open<const D: usize>(
+        &self,
+        system: &mut System<D>,
+        state: &mut State<D>,
+    ) -> Result<Vec<f64>, Error> {
+        self.check()?;
+        if !state.motion.begun && system.course.is_none() {
+            system.refuse_inverted(&[1.0])?;
+        }
+        let volumes = volumes(system);
+        system.contact.iter_mut().for_each(Contact::end_friction);
+        if state.motion.begun {
+            system.move_planes(self.factor(system, state.motion.time).0, state.motion.time);
+            system.restore(state)?;
+            system.contact.iter_mut().for_each(|contact| contact.resume_friction(&state.contact.grips));
+        } else {
+            self.begin(system, state, &volumes)?;
+        }
+        Ok(volumes)
+    }
+
+    /// Time at the end of the next row of history, s, with steps planned to it.
+    pub(super) fn end_of_row<const D: usize>(&self, state: &mut State<D>) -> f64 {
+        // the last of them is the end time to the bit
+        let end = self.end_time * ((state.step + 1) as f64 / self.records as f64);
+        if state.motion.steps.planned == 0 {
+            state.motion.plan(end);
+        }
+        end
+    }
+
+    /// Adds the row of history that steps have come to.
+    pub(super) fn close_row<const D: usize>(
+        &self,
+        system: &mut System<D>,
+        state: &mut State<D>,
+    ) -> Result<(), Error> {
+        system.check_overlaps(state)?;
+        self.record(system, state);
+        state.step += 1;
+        (state.counts.iteration, state.counts.step_iterations, state.motion.steps.planned) = (0, 0, 0);
+        Ok(())
+    }
+
     /// Load factor at a time, and its rate from then on.
-    fn factor<const D: usize>(&self, system: &System<D>, time: f64) -> (f64, f64) {
+    pub(super) fn factor<const D: usize>(&self, system: &System<D>, time: f64) -> (f64, f64) {
         if let Some(course) = system.course {
             return course(time);
         }
@@ -344,7 +370,7 @@ impl VelocityVerlet {
     }
 
     /// Updates the energies of a step and checks them.
-    fn account<const D: usize>(
+    pub(super) fn account<const D: usize>(
         &self,
         state: &mut State<D>,
         first: VerletSums,
@@ -388,9 +414,9 @@ impl VelocityVerlet {
         !sites.is_empty()
     }
 
-    fn status<const D: usize>(&self, state: &State<D>) -> Status {
+    pub(super) fn status<const D: usize>(&self, state: &State<D>, restartable: bool) -> Status {
         let left = 1.0 - state.motion.steps.taken as f64 / state.motion.steps.planned as f64;
-        Status { residual: left, ..state.status(self.records, 0.1, self.damping, true) }
+        Status { residual: left, ..state.status(self.records, 0.1, self.damping, restartable) }
     }
 
     /// Adds a row of history.

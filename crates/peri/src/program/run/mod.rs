@@ -1,6 +1,7 @@
 //! Runs a scene: solves every variant, compares, draws and judges; resumable from checkpoints.
 
 mod compare;
+mod device;
 mod draw;
 mod history;
 mod outcome;
@@ -18,7 +19,7 @@ use crate::error::Error;
 use crate::program::observe::{self, FieldFrames, Moment, Physics, SceneObservers, in_space};
 use crate::program::quantities as q;
 use crate::program::scene::{self, NAMING, Scene, SceneVariant};
-use crate::solver::{Breaking, Method, State, Status, StepRecord, System, load_stepping};
+use crate::solver::{Breaking, State, Status, StepRecord, System, load_stepping};
 use harness::case::{Fault, Run, Step, StepField};
 use harness::observe::{Outputs, Scalars};
 use harness::report::{Phases, Report};
@@ -82,17 +83,18 @@ fn run_in<const D: usize>(
     let (output, quick) = (run.options.output, run.options.quick);
     let variants = observe::check(source, scene, quick)?;
     // every body is built once before anything is computed or written, so that errors show at once
-    let (mut largest, mut memory) = (0, f64::MIN_POSITIVE);
+    let (mut largest, mut memory, mut on_card) = (0, f64::MIN_POSITIVE, false);
     for variant in variants.iter().filter(|variant| variant.of.expect_error.is_none()) {
         let (source, scene) = variant.resolved();
         let bonds = Physics::<D>::new(source, scene, variant)?.0.bonds;
+        on_card |= device::choose(source, scene, &*bonds)?.card.is_some();
         largest = largest.max(bonds.particles().len());
         memory = memory.max(scene::memory_needed(scene, &*bonds));
     }
     run.begin()?;
     // one after another if steps are observed or run times are compared
     let timed = scene.exact.is_some() || scene.output.compare.is_some();
-    let alone = run.options.on_step.is_some() || timed || largest > LARGE_BODY;
+    let alone = run.options.on_step.is_some() || timed || on_card || largest > LARGE_BODY;
     let fitting = (available() / memory) as usize;
     let at_once = if alone { 1 } else { rayon::current_num_threads().min(fitting).max(1) };
     let names: Vec<String> = variants.iter().map(SceneVariant::name).collect();
@@ -171,12 +173,14 @@ fn run_variant<const D: usize>(
     physics.name = outcome.file_name();
     outcome.warnings = scene::warnings(source, scene, &body);
     outcome.warnings.extend(scene::tearing_warnings(scene, &body, physics.body.toughness.as_ref()));
+    let device = device::choose(source, scene, &*body.bonds)?;
+    outcome.warnings.extend(device.note);
     outcome.snaps_back = scene.solver.snap_back;
     let mut state = initial_state((source, scene), &body, state, output)?;
     let mut observers = observe::observers::<D>(scene);
     let mut frames = FieldFrames::new(scene, &state, &output.join(physics.field_file()))?;
     let ended = match solve(
-        (source, scene),
+        (source, scene, device.card.as_ref()),
         &physics,
         variant_run,
         &mut body,
@@ -248,7 +252,7 @@ fn initial_state<const D: usize>(
 }
 
 fn solve<const D: usize>(
-    (source, scene): (&Source, &Scene),
+    (source, scene, card): (&Source, &Scene, Option<&device::Card>),
     physics: &Physics<D>,
     variant_run: &VariantRun,
     body: &mut scene::DiscreteBody<D>,
@@ -297,7 +301,9 @@ fn solve<const D: usize>(
         Ok(())
     };
     let solved = match &scene.dynamics {
-        Some(dynamics) => dynamics.method().solve(&mut system, state, &mut watch, &mut finished),
+        Some(dynamics) => {
+            device::solve(card, &dynamics.method(), &mut system, state, &mut watch, &mut finished)
+        }
         None => load_stepping(&mut *scene.equilibria(), &mut system, state, &mut watch, &mut finished),
     };
     phases.borrow_mut().stop();
@@ -364,6 +370,8 @@ fn explanation_in<const D: usize>(
         let (criterion, reports) = (physics.body.criterion.as_ref(), observe::quantities(scene));
         lines.extend(scene::explain(source, scene, &variant, &body, criterion, &reports)?);
         lines.extend(scene::explain_tearing(scene, &body, physics.body.toughness.as_ref()));
+        let device = device::choose(source, scene, &*body.bonds)?;
+        lines.extend(device.note.map(|note| format!("  builds     {note}")));
         lines.extend(physics.body.followed.iter().map(|one| format!("  follows    {one}")));
     }
     lines.extend(lengths.into_iter().map(|text| format!("  warning    {text}")));

@@ -54,6 +54,8 @@ impl Fault for Error {
     fn exit_code(&self) -> u8 {
         match self {
             Self::Geometry(_) | Self::Parameter { .. } | Self::TimeStep { .. } => 2,
+            #[cfg(feature = "gpu")]
+            Self::Device(_) => 2,
             Self::NoEquilibrium { torn, .. } => 2 - u8::from(*torn),
             Self::NotFinite { .. }
             | Self::NotConverged { .. }

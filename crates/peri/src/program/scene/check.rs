@@ -2,7 +2,9 @@
 
 use super::values::{ONE_OF_THEM, plain, positive, ratio, required};
 use super::variant::{SceneVariant, variants};
-use super::{HORIZON_RATIO, HistoryProbe, Scene, SolverMethod, Track, VaryingParameter};
+use super::{
+    DeviceChoice, Dynamics, HORIZON_RATIO, HistoryProbe, Precision, Scene, SolverMethod, Track, VaryingParameter,
+};
 use crate::calibrate::{Calibration, Space};
 use crate::solver::Policy;
 use crate::stress::StressMethod;
@@ -121,6 +123,7 @@ fn dynamics(source: &Source, scene: &Scene) -> Result<(), SceneError> {
                 let allowed = "\"double\"; \"mixed\" is for bond laws in bodies of shapes";
                 return Err(source.error("dynamics.precision", format!("\"mixed\" of {what}"), allowed));
             }
+            device(source, dynamics)?;
             if let Some(factor) = &dynamics.factor {
                 if dynamics.ramp.is_some() {
                     return Err(source.conflict("dynamics.factor", "ramp", ONE_OF_THEM));
@@ -151,6 +154,20 @@ fn dynamics(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         }
         None => Ok(()),
     }
+}
+
+fn device(source: &Source, dynamics: &Dynamics) -> Result<(), SceneError> {
+    let (device, precision) = (dynamics.device, dynamics.precision);
+    let found = match (device, precision) {
+        (DeviceChoice::Cpu, Precision::Single) => "\"single\" on the processor",
+        (DeviceChoice::Gpu, Precision::Mixed) => "\"mixed\" on a graphics card",
+        _ => return Ok(()),
+    };
+    let allowed = match device {
+        DeviceChoice::Cpu => "\"double\" or \"mixed\"; \"single\" is for `device = \"gpu\"`",
+        _ => "\"double\" or \"single\"",
+    };
+    Err(source.error("dynamics.precision", found, allowed))
 }
 
 fn output(source: &Source, scene: &Scene) -> Result<(), SceneError> {

@@ -161,9 +161,36 @@ pub struct Dynamics {
     /// Precision of bond forces; default: double.
     #[serde(default)]
     pub precision: ForcePrecision,
+    /// Device that takes the steps; default: the processor.
+    #[serde(default)]
+    pub device: DeviceChoice,
 }
 
-/// Precision of bond forces on a lattice; everything else is in double precision.
+/// Device that takes the steps of explicit dynamics.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum DeviceChoice {
+    /// The processor.
+    #[default]
+    Cpu,
+    /// A graphics card: a lattice of a bond law, without contact, inclusions, surface correction and rotations.
+    Gpu,
+    /// A graphics card where there is one that can do it and the body is large enough to gain by it, the processor otherwise.
+    Auto,
+}
+
+impl DeviceChoice {
+    /// Its name in scenes.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Cpu => "cpu",
+            Self::Gpu => "gpu",
+            Self::Auto => "auto",
+        }
+    }
+}
+
+/// Precision of bond forces on a lattice; everything else is in double precision, but on a graphics card in single precision.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ForcePrecision {
@@ -174,6 +201,8 @@ pub enum ForcePrecision {
     /// `mixed_error`. Double precision while stretches are so extreme that single precision would miss the
     /// law by more than 1e-5.
     Mixed,
+    /// Single precision throughout, on a graphics card.
+    Single,
 }
 
 impl Dynamics {

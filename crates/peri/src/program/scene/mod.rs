@@ -44,7 +44,7 @@ pub use inclusion::{Inclusion, Inclusions};
 pub use line::{LineField, SectionSpec, line_fields};
 pub use loads::{loads_of, region_names, velocities_of};
 pub use memory::needed as memory_needed;
-pub use method::{Dynamics, ForcePrecision, SolverMethod, SolverSpec};
+pub use method::{DeviceChoice, Dynamics, ForcePrecision, SolverMethod, SolverSpec};
 pub use placement::{check_placement, exact_plate};
 pub use probe::{HistoryProbe, Track};
 pub use solid::{SolidKind, SolidLaw};
@@ -445,7 +445,8 @@ impl Scene {
 
     /// Returns the largest relative error of the fitted bond law.
     pub fn fit_bound(&self) -> f64 {
-        let rough = self.material.critical.is_some() || self.is_mixed();
+        let single = self.dynamics.as_ref().is_some_and(|dynamics| dynamics.precision == Precision::Single);
+        let rough = self.material.critical.is_some() || self.is_mixed() || single;
         self.solver.fit_bound.unwrap_or(if rough { 1e-6 } else { 1e-9 })
     }
 

@@ -1,0 +1,90 @@
+//! A scene whose steps a graphics card takes, or a program that stands for one: the report of the processor.
+
+use harness::case::{self, Options};
+use harness::scene::Source;
+use peri::gpu::{Device, Precision};
+use peri::program::run::{Finished, Peri};
+
+/// A notched plate that is hit beside its notch, and torn.
+const SCENE: &str = r#"
+version = 1
+program = "peri"
+[body]
+space = "plane-stress"
+thickness = "1 mm"
+spacing = "1 mm"
+shapes = [{ add = "box", min = ["0 mm", "0 mm"], max = ["24 mm", "30 mm"] }]
+cracks = [{ from = ["-1 mm", "15 mm"], to = ["9.6 mm", "15 mm"] }]
+[material]
+youngs_modulus = "191 GPa"
+law = "linear"
+critical = { stretch = 1.01 }
+[[boundary]]
+name = "hit"
+min = ["0 mm", "15 mm"]
+max = ["2 mm", "30 mm"]
+displacement = ["0.5 mm", "free"]
+[[boundary]]
+name = "pushed"
+min = ["0 mm", "0 mm"]
+max = ["24 mm", "2 mm"]
+force = ["0 N", "50 N"]
+[solver]
+method = "verlet"
+[dynamics]
+density = "8000 kg/m^3"
+end_time = "20 us"
+ramp = "20 us"
+damping = "1000 1/s"
+records = 8
+device = "cpu"
+[[probe]]
+name = "crack"
+track = "crack"
+axis = "x"
+[output]
+pictures = false
+fields = false
+"#;
+
+fn run(name: &str, scene: &str) -> Result<Finished, Box<dyn std::error::Error>> {
+    let folder = tempfile::tempdir()?;
+    Ok(case::run::<Peri>(&Source::new(name, scene), Options::new(folder.path()))?)
+}
+
+#[test]
+fn gpu_scene_has_the_report_of_the_processor() {
+    let host = run("host.toml", SCENE).unwrap();
+    let broken = host.report.scalar("broken_bonds").unwrap();
+    assert!(broken > 10.0, "{broken} bonds broke");
+    let auto = run("auto.toml", &SCENE.replace("\"cpu\"", "\"auto\"")).unwrap();
+    let why = auto.outcomes[0].warnings.join("\n");
+    assert!(why.contains("directed bonds are too few"), "{why}");
+    let Ok(device) = Device::portable() else {
+        let error = run("gpu.toml", &SCENE.replace("\"cpu\"", "\"gpu\"")).err().map(|error| error.to_string());
+        assert!(error.unwrap_or_default().contains("no graphics card"));
+        return evidence::skipped("a device behind Vulkan, Metal or DirectX 12");
+    };
+    let precisions = [(Precision::Double, "double", 1e-9), (Precision::Single, "single", 1e-3)];
+    let kinds: Vec<_> = precisions.into_iter().collect();
+    for (precision, word, allowed) in kinds {
+        if Device::portable().and_then(|device| device.with_precision(precision)).is_err() {
+            continue;
+        }
+        let scene = SCENE.replace("device = \"cpu\"", &format!("device = \"gpu\"\nprecision = \"{word}\""));
+        let found = run("gpu.toml", &scene).unwrap();
+        let note = found.outcomes[0].warnings.join("\n");
+        assert!(note.contains(device.name()) && note.contains(word), "{note}");
+        assert_eq!(found.report.scalar("broken_bonds"), Some(broken), "{word}");
+        for (name, expected, _) in &host.outcomes[0].values {
+            let value = found.outcomes[0].get(name).unwrap();
+            let apart = (value - expected).abs();
+            assert!(apart <= allowed * expected.abs().max(1e-12) || name == "energy_error", "{word} {name}: {value:e} {expected:e}");
+        }
+        let crack = |finished: &Finished| {
+            let rows = finished.outcomes[0].history.iter();
+            rows.map(|row| (row.broken, row.seen.clone())).collect::<Vec<_>>()
+        };
+        assert_eq!(crack(&found), crack(&host), "{word}");
+    }
+}
