@@ -203,7 +203,7 @@ fn solve(workspace: &Repository, options: &Options, name: &str, scene: &Path) ->
     let program = program(workspace.root(), scene)?;
     let executable = match &options.from {
         Some(folder) => folder.join(&program).with_extension(std::env::consts::EXE_EXTENSION),
-        None => workspace.release(&program)?,
+        None => workspace.build_program(&program)?,
     };
     let output = workspace.results("pictures")?.join(name);
     print(&format!("{program} run {}\n", scene.display()));

@@ -5,7 +5,7 @@
 //! and the stretches that its forces meet are looked at.
 
 use super::criterion::Criterion;
-use super::method::{Finished, Watch};
+use super::method::{StepCallback, Watch};
 use super::motion::StretchLook;
 use super::state::State;
 use super::system::System;
@@ -37,7 +37,7 @@ impl VelocityVerlet {
         system: &mut System<D>,
         state: &mut State<D>,
         watch: &mut Watch<D>,
-        finished: &mut Finished<D>,
+        finished: &mut StepCallback<D>,
     ) -> Result<(), Error> {
         refuse(system)?;
         self.open(system, state)?;

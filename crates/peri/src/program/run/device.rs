@@ -3,7 +3,7 @@
 use crate::bonds::Bonds;
 use crate::error::Error;
 use crate::program::scene::{DeviceChoice, Dynamics, Scene};
-use crate::solver::{Finished, Method, State, System, VelocityVerlet, Watch};
+use crate::solver::{StepCallback, Method, State, System, VelocityVerlet, Watch};
 use harness::scene::{SceneError, Source};
 
 /// Directed bonds below which launching kernels takes longer than the processor's forces.
@@ -71,7 +71,7 @@ pub fn solve<const D: usize>(
     system: &mut System<D>,
     state: &mut State<D>,
     watch: &mut Watch<D>,
-    finished: &mut Finished<D>,
+    finished: &mut StepCallback<D>,
 ) -> Result<(), Error> {
     match card {
         #[cfg(feature = "gpu")]

@@ -3,7 +3,7 @@
 use super::values::{ONE_OF_THEM, plain, positive, ratio, required};
 use super::variant::{SceneVariant, variants};
 use super::{
-    DeviceChoice, Dynamics, HORIZON_RATIO, HistoryProbe, Precision, Scene, SolverMethod, Track, VaryingParameter,
+    DeviceChoice, Dynamics, HORIZON_RATIO, HistoryProbe, ForcePrecision, Scene, SolverMethod, Track, VaryingParameter,
 };
 use crate::calibrate::{Calibration, Space};
 use crate::solver::Policy;
@@ -159,8 +159,8 @@ fn dynamics(source: &Source, scene: &Scene) -> Result<(), SceneError> {
 fn device(source: &Source, dynamics: &Dynamics) -> Result<(), SceneError> {
     let (device, precision) = (dynamics.device, dynamics.precision);
     let found = match (device, precision) {
-        (DeviceChoice::Cpu, Precision::Single) => "\"single\" on the processor",
-        (DeviceChoice::Gpu, Precision::Mixed) => "\"mixed\" on a graphics card",
+        (DeviceChoice::Cpu, ForcePrecision::Single) => "\"single\" on the processor",
+        (DeviceChoice::Gpu, ForcePrecision::Mixed) => "\"mixed\" on a graphics card",
         _ => return Ok(()),
     };
     let allowed = match device {
