@@ -61,7 +61,9 @@ fn measure<const D: usize>(cells: u32, steps: u64) -> Result<(), Box<dyn std::er
         body.set_state(&bonds, [&displacement, &zero, &found], time_step)?;
         let (name, error) = (device.name().to_owned(), largest_apart(&found, &expected));
         println!("  {name}, {precision:?}: forces off by {error:.1e} of the largest");
-        for (what, pulls, looks) in [("forces", true, false), ("forces that look", true, true), ("steps", false, false)] {
+        for (what, pulls, looks) in
+            [("forces", true, false), ("forces that look", true, true), ("steps", false, false)]
+        {
             let take = |body: &mut DeviceBody<D>, steps: usize| -> Result<StepSums, peri::Error> {
                 let mut last = StepSums::default();
                 for taken in 0..steps {

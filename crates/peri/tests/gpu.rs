@@ -152,7 +152,10 @@ impl<const D: usize> Case<D> {
         if !same {
             let events = found.state.fracture.events.iter().zip(&host.state.fracture.events);
             let first = events.enumerate().find(|(_, (a, b))| a != b);
-            eprintln!("{name}: {} and {} bonds, first difference {first:?}", found.state.fracture.broken, host.state.fracture.broken);
+            eprintln!(
+                "{name}: {} and {} bonds, first difference {first:?}",
+                found.state.fracture.broken, host.state.fracture.broken
+            );
         }
         assert!(same || device.precision() == Precision::Single, "{name}: other bonds broke");
         if !same {
@@ -184,7 +187,10 @@ impl<const D: usize> Case<D> {
                 assert!(apart <= allowed, "{name}, {what} at {} s: {a:e} {b:e}", host.time);
             }
         }
-        eprintln!("{name}: {} steps, {} bonds broke", host.state.counts.total_iterations, host.state.fracture.broken);
+        eprintln!(
+            "{name}: {} steps, {} bonds broke",
+            host.state.counts.total_iterations, host.state.fracture.broken
+        );
     }
 }
 
@@ -259,8 +265,7 @@ fn gpu_kalthoff_winkler() {
         }
         let step = (DENSITY / (2.0 * stiffest)).sqrt();
         let end_time = 200.0 * step;
-        let solver =
-            VelocityVerlet { ramp: end_time, records: 8, ..VelocityVerlet::new(DENSITY, end_time) };
+        let solver = VelocityVerlet { ramp: end_time, records: 8, ..VelocityVerlet::new(DENSITY, end_time) };
         let velocity = Field::zeros(bonds.sites());
         let case = Case { loads, velocity, critical: Some(1.02), solver, law: Law::Linear };
         let host = case.run(&mut build(), None).unwrap();

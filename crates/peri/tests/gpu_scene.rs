@@ -1,9 +1,10 @@
 //! A scene whose steps a graphics card takes, or a program that stands for one: the report of the processor.
 
+use harness::case::Finished;
 use harness::case::{self, Options};
 use harness::scene::Source;
 use peri::gpu::{Device, Precision};
-use peri::program::run::{Finished, Peri};
+use peri::program::run::Peri;
 
 /// A notched plate that is hit beside its notch, and torn.
 const SCENE: &str = r#"
@@ -61,7 +62,8 @@ fn gpu_scene_has_the_report_of_the_processor() {
     let why = auto.outcomes[0].warnings.join("\n");
     assert!(why.contains("directed bonds are too few"), "{why}");
     let Ok(device) = Device::portable() else {
-        let error = run("gpu.toml", &SCENE.replace("\"cpu\"", "\"gpu\"")).err().map(|error| error.to_string());
+        let error =
+            run("gpu.toml", &SCENE.replace("\"cpu\"", "\"gpu\"")).err().map(|error| error.to_string());
         assert!(error.unwrap_or_default().contains("no graphics card"));
         return evidence::skipped("a device behind Vulkan, Metal or DirectX 12");
     };
@@ -79,7 +81,10 @@ fn gpu_scene_has_the_report_of_the_processor() {
         for (name, expected, _) in &host.outcomes[0].values {
             let value = found.outcomes[0].get(name).unwrap();
             let apart = (value - expected).abs();
-            assert!(apart <= allowed * expected.abs().max(1e-12) || name == "energy_error", "{word} {name}: {value:e} {expected:e}");
+            assert!(
+                apart <= allowed * expected.abs().max(1e-12) || name == "energy_error",
+                "{word} {name}: {value:e} {expected:e}"
+            );
         }
         let crack = |finished: &Finished| {
             let rows = finished.outcomes[0].history.iter();

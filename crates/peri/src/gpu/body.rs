@@ -210,8 +210,7 @@ impl<const D: usize> DeviceBody<D> {
         self.intact = self.client.create_from_slice(u32::as_bytes(&intact));
         let scales = [1.0 / self.spacing, time_step / self.spacing, 1.0 / self.unit];
         let fields = [displacement, velocity, force];
-        self.fields =
-            std::array::from_fn(|k| upload(&self.client, self.precision, fields[k], scales[k]));
+        self.fields = std::array::from_fn(|k| upload(&self.client, self.precision, fields[k], scales[k]));
         Ok(())
     }
 
@@ -297,11 +296,7 @@ fn upload<const D: usize>(client: &Client, precision: Precision, field: &Field<D
     numbers(client, precision, field.components().into_iter().flatten().map(|x| x * scale))
 }
 
-pub(super) fn numbers(
-    client: &Client,
-    precision: Precision,
-    values: impl Iterator<Item = f64>,
-) -> Handle {
+pub(super) fn numbers(client: &Client, precision: Precision, values: impl Iterator<Item = f64>) -> Handle {
     match precision {
         // not beyond the range of single precision: ends of a law may be infinite, and no kernel has to know that
         Precision::Single => {

@@ -112,14 +112,7 @@ fn add_bond<F: Float>(
 
 /// Lists a bond, and counts it where the list is full.
 #[cube]
-fn note<F: Float>(
-    count: &[Atomic<u32>],
-    list: &mut [u32],
-    elongations: &mut [F],
-    site: u32,
-    k: usize,
-    e: F,
-) {
+fn note<F: Float>(count: &[Atomic<u32>], list: &mut [u32], elongations: &mut [F], site: u32, k: usize, e: F) {
     let place = count[0].fetch_add(1u32) as usize;
     if place < elongations.len() {
         list[2 * place] = site;

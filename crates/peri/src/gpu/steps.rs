@@ -65,7 +65,7 @@ impl<const D: usize> DeviceBody<D> {
                 number(ratio),
                 number(1.0 - half),
                 number(push),
-                number(step.factors[1] ),
+                number(step.factors[1]),
                 self.form,
                 self.precision.element(),
             );
@@ -153,7 +153,8 @@ impl<const D: usize> DeviceBody<D> {
                 mass * speed * speed * sum(kick + 2) + 0.5 * work * (after * sum(kick + 4) - sum(kick + 1)),
             ],
             damped: [damping * sum(1), damping * sum(kick + 3)],
-            increment: self.spacing * lists[LEAP_SUMS - 1].iter().fold(0.0_f64, |most, &x| if most >= x { most } else { x }),
+            increment: self.spacing
+                * lists[LEAP_SUMS - 1].iter().fold(0.0_f64, |most, &x| if most >= x { most } else { x }),
             kinetic: mass * speed * speed * sum(kick),
         }
     }

@@ -10,7 +10,7 @@ use super::motion::StretchLook;
 use super::state::State;
 use super::system::System;
 use super::verlet::VelocityVerlet;
-use super::verlet_step::Sums;
+use super::verlet_step::VerletSums;
 use crate::bonds::{LatticeBonds, Overstretched, Property};
 use crate::error::Error;
 use crate::gpu::{Device, DeviceBody, DeviceLoads, DeviceStep, MOST_STEPS, StepSums};
@@ -154,7 +154,7 @@ impl VelocityVerlet {
         system.count_evaluation(state);
         let look = state.motion.look.is_due(state.stretches.fitted, system.breaking_stretch());
         if look {
-            state.stretches.see(observed);
+            state.stretches.observe(observed);
             state.motion.look = StretchLook::new(observed);
             if observed.high.is_finite() && system.widen(state)? {
                 run.take_law(system)?;
@@ -185,9 +185,10 @@ impl VelocityVerlet {
         state.motion.time = after;
         state.motion.steps.taken += 1;
         state.counts.iterate();
-        let half = |k: usize| Sums { work: sums.work[k], damped: sums.damped[k], ..Sums::default() };
-        let first = Sums { increment: sums.increment, ..half(0) };
-        self.account(state, first, Sums { kinetic: sums.kinetic, ..half(1) })
+        let half =
+            |k: usize| VerletSums { work: sums.work[k], damped: sums.damped[k], ..VerletSums::default() };
+        let first = VerletSums { increment: sums.increment, ..half(0) };
+        self.account(state, first, VerletSums { kinetic: sums.kinetic, ..half(1) })
     }
 }
 
@@ -285,9 +286,8 @@ fn critical<'a, const D: usize>(system: &'a System<D>) -> Option<&'a Property> {
 
 /// e from which bonds are listed: those that break, and some within rounding of them.
 fn limit<const D: usize>(system: &System<D>) -> f64 {
-    critical(system).map_or(f64::INFINITY, |critical| {
-        (critical.least() * critical.least() - 1.0) * (1.0 - 1e-6) - 1e-12
-    })
+    critical(system)
+        .map_or(f64::INFINITY, |critical| (critical.least() * critical.least() - 1.0) * (1.0 - 1e-6) - 1e-12)
 }
 
 /// Refuses what only the host can do.

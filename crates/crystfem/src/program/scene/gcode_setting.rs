@@ -80,7 +80,7 @@ impl<D: Dimension + Copy> TimesSpec<D> {
     /// Returns a setting of a G-code file over time. Each command acts within a second, but a bed that is
     /// switched off or set lower cools exponentially. Before the first command its value applies; the fan is
     /// off.
-    pub(super) fn from_gcode(
+    pub(super) fn gcode_schedule(
         &self,
         source: &Source,
         key: &str,

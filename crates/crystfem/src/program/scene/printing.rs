@@ -64,7 +64,7 @@ impl PrintSpec {
             match error {
                 Error::Parameter { name: NOZZLE, found: time, .. } => {
                     let why =
-                    format!("the file sets no nozzle temperature (M104, M109) before {time} s; write it");
+                        format!("the file sets no nozzle temperature (M104, M109) before {time} s; write it");
                     source.missing("print.temperature", why)
                 }
                 other => located(source, "print.window", &other),

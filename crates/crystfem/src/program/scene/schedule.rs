@@ -74,7 +74,7 @@ impl<D: Dimension + Copy> ScheduleSpec<D> {
         };
         let table = !(over.time.is_empty() && over.value.is_empty());
         if let Some(of) = over.of {
-            return over.from_gcode(source, key, of, table);
+            return over.gcode_schedule(source, key, of, table);
         }
         if over.cools_to.is_some() || over.cooling_time.is_some() {
             let name = if over.cools_to.is_some() { "cools_to" } else { "cooling_time" };

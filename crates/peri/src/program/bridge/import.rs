@@ -33,8 +33,9 @@ const NAMES: [(&str, &str); 3] =
 /// A folder without an export or without steps, a truncated file, results that cannot be written.
 pub fn import(folder: &Path, output: &Path) -> Result<Report, PeriFailure> {
     let path = folder.join("model.json");
-    let model: ExportHeader = serde_json::from_str(&read_to_string(&path).map_err(Error::from_io("read", &path))?)
-        .map_err(|error| fault(&path, "model of an export", error.to_string()))?;
+    let model: ExportHeader =
+        serde_json::from_str(&read_to_string(&path).map_err(Error::from_io("read", &path))?)
+            .map_err(|error| fault(&path, "model of an export", error.to_string()))?;
     if model.format != "peri-lammps 1" {
         return Err(fault(&path, "model of an export", format!("its format is `{}`", model.format)).into());
     }

@@ -3,7 +3,8 @@
 use super::values::{ONE_OF_THEM, plain, positive, ratio, required};
 use super::variant::{SceneVariant, variants};
 use super::{
-    DeviceChoice, Dynamics, HORIZON_RATIO, HistoryProbe, ForcePrecision, Scene, SolverMethod, Track, VaryingParameter,
+    DeviceChoice, Dynamics, ForcePrecision, HORIZON_RATIO, HistoryProbe, Scene, SolverMethod, Track,
+    VaryingParameter,
 };
 use crate::calibrate::{Calibration, Space};
 use crate::solver::Policy;

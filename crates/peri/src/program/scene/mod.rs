@@ -445,7 +445,8 @@ impl Scene {
 
     /// Returns the largest relative error of the fitted bond law.
     pub fn fit_bound(&self) -> f64 {
-        let single = self.dynamics.as_ref().is_some_and(|dynamics| dynamics.precision == ForcePrecision::Single);
+        let single =
+            self.dynamics.as_ref().is_some_and(|dynamics| dynamics.precision == ForcePrecision::Single);
         let rough = self.material.critical.is_some() || self.is_mixed() || single;
         self.solver.fit_bound.unwrap_or(if rough { 1e-6 } else { 1e-9 })
     }
