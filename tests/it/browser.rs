@@ -108,7 +108,8 @@ impl Browser {
         }
     }
 
-    /// Faults of the layout: texts that overlap, are cut off or stand outside of the window, and controls without a name.
+    /// Faults of the layout: texts that overlap, are cut off or stand outside of the window, and controls
+    /// without a name.
     #[track_caller]
     pub fn layout_faults(&self) -> Vec<Value> {
         let script = json!({ "script": include_str!("layout.js"), "args": [] });

@@ -155,7 +155,10 @@ fn a_path_beside_the_part() {
     told.shows("the beads cover 9.5 % of the part; 50.0 % of their length lies outside");
     scene("centre = true\nfill = true");
     let told = crystfem("check cube.toml", here).with_code(0);
-    told.shows("the beads cover 19.0 % of the part; 0.0 % of their length lies outside; with filled gaps 100.0 % are printed");
+    told.shows(
+        "the beads cover 19.0 % of the part; 0.0 % of their length lies outside; with filled gaps \
+        100.0 % are printed",
+    );
     told.shows("1600 elements in total");
 }
 

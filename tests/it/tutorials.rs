@@ -1,4 +1,5 @@
-//! Runs every command of the tutorials that begin with a reader's own file, in a copy of the folder that has it.
+//! Runs every command of the tutorials that begin with a reader's own file, in a copy of the folder that has
+//! it.
 
 use crate::documents::{commands_of, ours};
 use crate::program::{command, finish, workspace};

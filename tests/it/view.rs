@@ -142,7 +142,8 @@ fn a_sheet_that_tears() {
     let size = "stage.zoom";
     let before = browser.value(eye);
     let middle = browser.value(
-        "(() => { stage.element.scrollIntoView({ block: 'center' }); const box = stage.element.getBoundingClientRect(); \
+        "(() => { stage.element.scrollIntoView({ block: 'center' }); const box = \
+         stage.element.getBoundingClientRect(); \
          return [box.left + box.width / 2, box.top + box.height / 2]; })()",
     );
     let [x, y] = [0, 1].map(|k| middle[k].as_f64().unwrap());

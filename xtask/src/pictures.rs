@@ -1,4 +1,5 @@
-//! Draws the pictures and tables of README and guide from cases, copies the files that pages show, and finds what is stale.
+//! Draws the pictures and tables of README and guide from cases, copies the files that pages show, and finds
+//! what is stale.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -265,7 +266,8 @@ mod tests {
         write("crates/harness/src/output/picture.rs", "");
         write("crates/peri/src/lib.rs", "fn a() {}\n");
         write("cases/plate/case.toml", "program = 'peri'\n");
-        let list = "cases = { plate = 'cases/plate/case.toml' }\n[[picture]]\nfile = 'docs/a.png'\nwidth = 10\n\
+        let list = "cases = { plate = 'cases/plate/case.toml' }\n[[picture]]\nfile = 'docs/a.png'\nwidth = \
+            10\n\
                     [[picture.panel]]\ncase = 'plate'\nfrom = 'a.png'\n";
         write(LIST, list);
         let files = ["docs/a.png", "docs/b.png"].map(PathBuf::from);

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 /// Characters of the longest line.
 const MOST: usize = 110;
 
-/// Findings of `cargo xtask tidy`: lines of prose that are too long. Tables, code, headings, quotes, pictures and HTML may be
-/// longer, and `docs/validation.md` is generated.
+/// Findings of `cargo xtask tidy`: lines of prose that are too long. Tables, code, headings, quotes, pictures
+/// and HTML may be longer, and `docs/validation.md` is generated.
 pub fn findings(root: &Path, files: &[PathBuf]) -> Vec<String> {
     let is_page = |file: &&PathBuf| file.extension().is_some_and(|extension| extension == "md");
     let pages = files.iter().filter(is_page).filter(|file| *file != Path::new("docs/validation.md"));

@@ -63,8 +63,8 @@ pub fn sources(root: &Path, crates: &[&str], parts: &[&str]) -> Vec<String> {
     folders.chain(below).filter(|source| root.join(source).exists()).collect()
 }
 
-/// Hashes names and contents of all files, sorted by name, by FNV-1a: the same on every machine. Lines of Rust
-/// that are blank or comments do not count.
+/// Hashes names and contents of all files, sorted by name, by FNV-1a: the same on every machine. Lines of
+/// Rust that are blank or comments do not count.
 fn hash(root: &Path, sources: &[String]) -> std::io::Result<String> {
     let mut files = Vec::new();
     for source in sources {

@@ -27,7 +27,8 @@ crate::quantities! {
     pub OF_STUDIES:
     LIMIT = "{convergence}.limit", "*", "value that three studies tend to, after Richardson";
     ORDER = "{convergence}.order", "", "observed order of these studies";
-    ERROR_OF = "{curve}.error_of_{study}", "", "rms error of a study in an error-against-time curve, in its unit";
+    ERROR_OF = "{curve}.error_of_{study}", "", "rms error of a study in an error-against-time curve, in its \
+        unit";
 }
 
 /// A `T` of the scene that a study gives: read where it stands in for the scene's own.

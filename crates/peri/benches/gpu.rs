@@ -89,7 +89,8 @@ fn measure<const D: usize>(cells: u32, steps: u64) -> Result<(), Box<dyn std::er
             let seconds = begin.elapsed().as_secs_f64();
             let rate = (count * steps) as f64 / seconds;
             println!(
-                "    {what}: {count} bonds, {steps} of them, {seconds:.4} s, {rate:.3e} directed bonds/s, {:.3} ms each; kinetic \
+                "    {what}: {count} bonds, {steps} of them, {seconds:.4} s, {rate:.3e} directed bonds/s, \
+                 {:.3} ms each; kinetic \
                  energy {:.3e} J",
                 1e3 * seconds / steps as f64,
                 last.kinetic

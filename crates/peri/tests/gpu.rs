@@ -105,7 +105,8 @@ fn gpu_forces_are_those_of_the_host() {
     }
 }
 
-/// A run of a system, by the host or on a device: the state at the end, and the bonds intact and broken after each row of history.
+/// A run of a system, by the host or on a device: the state at the end, and the bonds intact and broken after
+/// each row of history.
 struct Ran<const D: usize> {
     state: State<D>,
     rows: Vec<(Vec<u64>, u64)>,
@@ -141,8 +142,9 @@ impl<const D: usize> Case<D> {
         Ok(Ran { state, rows })
     }
 
-    /// Compares a run on a device with the host's: the same bonds break in the same row of history, and in double precision in the
-    /// same step; energies and displacements agree to `allowed` times the host's greatest.
+    /// Compares a run on a device with the host's: the same bonds break in the same row of history, and in
+    /// double precision in the same step; energies and displacements agree to `allowed` times the host's
+    /// greatest.
     fn compare(&self, name: &str, device: &Device, build: &dyn Fn() -> LatticeBonds<D>, allowed: f64) {
         let host = self.run(&mut build(), None).unwrap();
         let found = self.run(&mut build(), Some(device)).unwrap();

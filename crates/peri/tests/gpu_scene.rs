@@ -1,10 +1,10 @@
 //! A scene whose steps a graphics card takes, or a program that stands for one: the report of the processor.
 
-use harness::case::Finished;
-use harness::case::{self, Options};
+use harness::case::{Case, Options, Run};
 use harness::scene::Source;
 use peri::gpu::{Device, Precision};
-use peri::program::run::Peri;
+use peri::program::run::{self, FinishedScene, Peri};
+use peri::program::scene::Scene;
 
 /// A notched plate that is hit beside its notch, and torn.
 const SCENE: &str = r#"
@@ -48,9 +48,11 @@ pictures = false
 fields = false
 "#;
 
-fn run(name: &str, scene: &str) -> Result<Finished, Box<dyn std::error::Error>> {
+fn run(name: &str, scene: &str) -> Result<FinishedScene, Box<dyn std::error::Error>> {
     let folder = tempfile::tempdir()?;
-    Ok(case::run::<Peri>(&Source::new(name, scene), Options::new(folder.path()))?)
+    let source = Source::new(name, scene);
+    let mut own = Run::new(const { &Peri::PROGRAM }, &source, Options::new(folder.path()));
+    Ok(run::run(&source, &source.parse::<Scene>()?, &mut own)?)
 }
 
 #[test]
@@ -86,7 +88,7 @@ fn gpu_scene_has_the_report_of_the_processor() {
                 "{word} {name}: {value:e} {expected:e}"
             );
         }
-        let crack = |finished: &Finished| {
+        let crack = |finished: &FinishedScene| {
             let rows = finished.outcomes[0].history.iter();
             rows.map(|row| (row.broken, row.seen.clone())).collect::<Vec<_>>()
         };

@@ -96,7 +96,8 @@ impl Image {
     }
 }
 
-/// Joins panels of one height from left to right; the whole is at most `width` pixels wide, and no panel is enlarged.
+/// Joins panels of one height from left to right; the whole is at most `width` pixels wide, and no panel is
+/// enlarged.
 pub fn side_by_side(panels: &[Image], width: usize) -> Image {
     let gaps = GAP * panels.len().saturating_sub(1);
     let aspects: f64 = panels.iter().map(|panel| panel.width as f64 / panel.height as f64).sum();

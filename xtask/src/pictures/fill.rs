@@ -1,5 +1,5 @@
-//! Text with values of reports: `{case > quantity > decimals}` or `{case > quantity > decimals > factor}`; with `e2` instead
-//! of decimals in scientific notation.
+//! Text with values of reports: `{case > quantity > decimals}` or `{case > quantity > decimals > factor}`;
+//! with `e2` instead of decimals in scientific notation.
 
 use miette::{Result, miette};
 

@@ -1,5 +1,6 @@
-//! Files shown in Markdown: the fence behind `<!-- file: PATH -->` has the text of the file, so that it is visible in plain
-//! Markdown, too; of `PATH#NAME` the part between `// ANCHOR: NAME` and `// ANCHOR_END: NAME`.
+//! Files shown in Markdown: the fence behind `<!-- file: PATH -->` has the text of the file, so that it is
+//! visible in plain Markdown, too; of `PATH#NAME` the part between `// ANCHOR: NAME` and `// ANCHOR_END:
+//! NAME`.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -104,7 +104,8 @@ impl WordCounts {
         let share = 100.0 * self.pronouns.len() as f64 / self.comments.max(1) as f64;
         format!(
             "words: {share:.2} % of {} doc comments begin with a pronoun (at most {} %), {} unclear function \
-             names (0), {} lines above {LONGEST} characters (0), {} shared type names (at most {MOST_SHARED})\n",
+             names (0), {} lines above {LONGEST} characters (0), {} shared type names (at most \
+             {MOST_SHARED})\n",
             self.comments,
             100.0 * MOST_PRONOUNS,
             self.functions.len(),
@@ -190,7 +191,8 @@ mod tests {
 
     #[test]
     fn functions() {
-        let text = "impl A {\n    pub(super) const fn of() {}\n    pub fn si() {}\n    fn at() {}\n    pub fn told() {}\n\
+        let text = "impl A {\n    pub(super) const fn of() {}\n    pub fn si() {}\n    fn at() {}\n    pub \
+            fn told() {}\n\
                     pub fn office() {}\n}\n#[cfg(test)]\nmod tests {\n    pub fn of() {}\n}\n";
         let found = words(&[("crates/a/src/a.rs", text), ("crates/a/tests/b.rs", text)]).findings();
         assert_eq!(found.len(), 2, "{found:?}");

@@ -149,7 +149,8 @@ fn deck(step: usize) -> String {
     }
     text + "*NSET, NSET=COLD, GENERATE\n1, 4, 1\n*NSET, NSET=HOT\n33, 34, 35, 36\n*NSET, NSET=EDGE\n1, 2\n\
                 *MATERIAL, NAME=STEEL\n*CONDUCTIVITY\n50.,\n\
-            *AMPLITUDE, NAME=RAMP\n0., 0., 1., 1.\n*STEP\n*HEAT TRANSFER\n1., 1.\n*BOUNDARY\nCOLD, 11, 11, 20.\n*END STEP\n"
+            *AMPLITUDE, NAME=RAMP\n0., 0., 1., 1.\n*STEP\n*HEAT TRANSFER\n1., 1.\n*BOUNDARY\nCOLD, 11, 11, \
+            20.\n*END STEP\n"
 }
 
 /// Node sets carry temperatures at their nodes and films on their faces; unused keywords of the deck are
@@ -237,9 +238,11 @@ fn files_of_thermal_analyses_are_opened_by_check() {
     write("no.vtu", "no XML");
     let scene = |file: &str, more: &str| {
         let text = format!(
-            "version = 1\nprogram = \"crystfem\"\n[material]\nlaw = \"semicrystalline\"\ndensity = \"1010 kg/m^3\"\n\
+            "version = 1\nprogram = \"crystfem\"\n[material]\nlaw = \"semicrystalline\"\ndensity = \"1010 \
+             kg/m^3\"\n\
                          conductivity = \"0.25 W/(m K)\"\n\
-             specific_heat = \"2200 J/(kg K)\"\nkinetics = \"table-4.1-column-1\"\ncrystallinity = 0.25\n[output]\npictures = false\n\
+             specific_heat = \"2200 J/(kg K)\"\nkinetics = \"table-4.1-column-1\"\ncrystallinity = \
+             0.25\n[output]\npictures = false\n\
              [[nodes]]\nname = \"n\"\nfile = \"{file}\"\nunit = \"K\"\n{more}"
         );
         write("nodes.toml", &text);
@@ -281,8 +284,10 @@ fn tetrahedra_warp_as_hexahedra_do() {
         let capacity = if order == 2 { "capacity = \"consistent\"\n" } else { "" };
         let rest = format!(
             "[mechanics]\nmaterial = \"m\"\nbed = \"bottom\"\n\
-                         law = {{ elastic = {{ modulus = \"1 GPa\", poisson = 0.3, expansion = \"1e-4 1/K\" }} }}\n\
-              strain_step = 1e-3\n[[boundary]]\nsurface = \"top\"\nfilm = \"500 W/(m^2 K)\"\nambient = \"20 degC\"\n\
+                         law = {{ elastic = {{ modulus = \"1 GPa\", poisson = 0.3, expansion = \"1e-4 1/K\" \
+                         }} }}\n\
+              strain_step = 1e-3\n[[boundary]]\nsurface = \"top\"\nfilm = \"500 W/(m^2 K)\"\nambient = \"20 \
+              degC\"\n\
                           [time]\nend = \"20 s\"\nstep = \"1 s\"\n{capacity}"
         );
         report(here, &mesh, &rest)

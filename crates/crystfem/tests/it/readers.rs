@@ -60,7 +60,8 @@ const WORDS: [&str; 16] = [
     "\0",
 ];
 
-const PATH: &str = "G28 ; home\nG1 X0 Y0.25 Z0.2 F600\nM83\nG1 X10 E1\nG0 Y0.75\nG1 X0 E1 (back)\nG4 P100\nG92 E0\nG91\n\
+const PATH: &str = "G28 ; home\nG1 X0 Y0.25 Z0.2 F600\nM83\nG1 X10 E1\nG0 Y0.75\nG1 X0 E1 (back)\nG4 \
+    P100\nG92 E0\nG91\n\
                     G1 Z0.2\nG90\nM117 layer\n";
 
 #[derive(Clone, Debug)]
@@ -163,7 +164,8 @@ proptest! {
 
     #[test]
     fn noise(bytes in prop::collection::vec(any::<u8>(), 0..300), binary in any::<bool>()) {
-        let header = if binary { &b"$MeshFormat\n4.1 1 8\n\x01\0\0\0\n$EndMeshFormat\n$Nodes\n"[..] } else { b"*NODE\n" };
+        let header = if binary { &b"$MeshFormat\n4.1 1 \
+            8\n\x01\0\0\0\n$EndMeshFormat\n$Nodes\n"[..] } else { b"*NODE\n" };
         let all = [header, &bytes].concat();
         judge("noise", if binary { gmsh::parse } else { abaqus::parse }, &all);
         judge("noise", abaqus::parse, &bytes);

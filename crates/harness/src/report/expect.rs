@@ -268,7 +268,8 @@ impl TryFrom<Written> for Expect {
             }
             _ => {
                 return Err(format!(
-                    "expectation of `{quantity}`: give `reference` and `tolerance`, or `at_least`, `at_most` or both"
+                    "expectation of `{quantity}`: give `reference` and `tolerance`, or `at_least`, `at_most` \
+                     or both"
                 ));
             }
         };

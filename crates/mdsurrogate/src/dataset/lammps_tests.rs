@@ -8,7 +8,8 @@ use super::*;
 pub(super) fn lammps_log(units: &str, runs: usize) -> String {
     let mut text = format!("LAMMPS (2 Aug 2023 - Update 3)\n{units}atom_style charge\nrun 100\n");
     text += "Per MPI rank memory allocation (min/avg/max) = 5.1 | 5.1 | 5.1 Mbytes\n   Step          Temp\n";
-    text += "         0   300.1\n       100   299.2\nLoop time of 1.2 on 4 procs for 100 steps with 500 atoms\n\n";
+    text += "         0   300.1\n       100   299.2\nLoop time of 1.2 on 4 procs for 100 steps with 500 \
+        atoms\n\n";
     for run in 0..runs {
         text += "Per MPI rank memory allocation (min/avg/max) = 5.1 | 5.1 | 5.1 Mbytes\n";
         text += "   Step  Time Temp  Lx  Ly  Lz  Pxx  Pyy  Pzz  Pxy  Pxz  Pyz\n";
@@ -128,7 +129,8 @@ fn logs_of_lammps() {
     assert_eq!(read_file("log", &own, &stresses(Some(1e6))).unwrap().paths[0].rows[3].cauchy[0], -3e9);
     let tilted = lammps_log("units metal\n  triclinic box = (0 0 0) to (20 30 40) with tilt (0 0 0)\n", 1);
     assert!(refused(read_file("log", &tilted, &options())).contains("without columns of its tilts"));
-    let multi = "LAMMPS (1 Jan 2024)\n------------ Step 0 ----- CPU = 0 (sec) -------------\nTotEng = -1 KinEng = 2\n";
+    let multi = "LAMMPS (1 Jan 2024)\n------------ Step 0 ----- CPU = 0 (sec) -------------\nTotEng = -1 \
+        KinEng = 2\n";
     assert!(
         refused(read_file("log", multi, &options())).contains("without thermo output in columns or yaml")
     );
@@ -137,9 +139,11 @@ fn logs_of_lammps() {
 #[test]
 fn yaml_and_averages_of_lammps() {
     let real = ReadOptions { units: Some(LammpsUnits::Real), ..ReadOptions::default() };
-    let yaml = "---\nkeywords: ['Step', 'Lx', 'Ly', 'Lz', 'Xy', 'Xz', 'Yz', 'Pxx', 'Pyy', 'Pzz', 'Pxy', 'Pxz', 'Pyz', ]\n\
+    let yaml = "---\nkeywords: ['Step', 'Lx', 'Ly', 'Lz', 'Xy', 'Xz', 'Yz', 'Pxx', 'Pyy', 'Pzz', 'Pxy', \
+        'Pxz', 'Pyz', ]\n\
                     data:\n\
-          \x20 - [0, 10, 20, 30, 0, 0, 0, 1, 2, 3, 0, 0, 0, ]\n  - [50, 10, 20, 30, 4, 0, 0, 100, 2, 3, -80, 0, 0, ]\n\
+          \x20 - [0, 10, 20, 30, 0, 0, 0, 1, 2, 3, 0, 0, 0, ]\n  - [50, 10, 20, 30, 4, 0, 0, 100, 2, 3, -80, \
+          0, 0, ]\n\
          \x20 - [100, 10, 20, 30, -2, 0, 0, 100, 2, 3, -180, 0, 0, ]\n...\n";
     let set = read_file("thermo.yaml", yaml, &real).unwrap();
     let shears: Vec<f64> = set.rows().map(|row| row.c[3]).collect();

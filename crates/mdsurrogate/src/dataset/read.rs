@@ -23,8 +23,9 @@ const FEMTOSECOND: f64 = 1e-15;
 ///   of the first Piola–Kirchhoff stress;
 /// - thermo output in LAMMPS logs (also `thermo_style yaml`), and files of `fix ave/time`;
 /// - `C11 C22 C33 C12 C13 C23` and `S11 … S23`;
-/// - nominal stresses of an incompressible body, as in [`hyperelastic::data::TestData`]: `stretch,nominal_MPa`,
-///   `mode,stretch,nominal_MPa` (a run per mode) or `stretch_1,stretch_2,nominal_1_MPa,nominal_2_MPa`.
+/// - nominal stresses of an incompressible body, as in [`hyperelastic::data::TestData`]:
+///   `stretch,nominal_MPa`, `mode,stretch,nominal_MPa` (a run per mode) or
+///   `stretch_1,stretch_2,nominal_1_MPa,nominal_2_MPa`.
 ///
 /// Optional columns: `run_id` (default: a file is one path), `kind`, `rate_x rate_y rate_z` (1/fs), `sample`,
 /// `time_fs`. Stress is in MPa, or in the unit of its heading. Pressures (`pxx …`, σ = −p) need

@@ -34,18 +34,21 @@ pub fn c_source(model: &Surrogate, name: &str) -> Result<CSource, Error> {
         return Err(Error::parameter("network", format!("{stack} bytes of stack"), "up to 1 MiB"));
     }
     let header = format!(
-        "/* {name}: a constitutive law C -> S, written by mdsurrogate. Voigt order 11 22 33 12 13 23, C_12 not doubled.
+        "/* {name}: a constitutive law C -> S, written by mdsurrogate. Voigt order 11 22 33 12 13 23, C_12 \
+         not doubled.
  * s: second Piola-Kirchhoff stress, Pa. tangent (36, row by row, or NULL): 2 dS/dC, Pa, no factors.
  * energy (or NULL): W, J/m3, 0 if the law has none. spread (or NULL): disagreement of the ensemble, Pa.
  * flags (or NULL): bit a: component a of C is outside the training data; bit 6 + a: it never changed there;
- * bit 12: the ensemble disagrees; bit 13: farther from the training strains than any of them was from the others.
+ * bit 12: the ensemble disagrees; bit 13: farther from the training strains than any of them was from the \
+ others.
  * Returns 0; 1: C is not positive definite or not finite; 2: the result is not finite. */
 #ifndef {upper}_H
 #define {upper}_H
 #ifdef __cplusplus
 extern \"C\" {{
 #endif
-int {name}(const double c[6], double s[6], double tangent[36], double *energy, double *spread, unsigned *flags);
+int {name}(const double c[6], double s[6], double tangent[36], double *energy, double *spread, unsigned \
+*flags);
 #ifdef __cplusplus
 }}
 #endif

@@ -110,7 +110,8 @@ contains
         pnewdt = 1
         one = 1d6
         energies = 0
-        call umat(cauchy, statev, ddsdde, energies(1), energies(2), unused, unused, six, six, unused, six, six, &
+        call umat(cauchy, statev, ddsdde, energies(1), energies(2), unused, unused, six, six, unused, six, \
+        six, &
             two, unused, unused, unused, two, two, repeat('x', 80), 3, 3, 6, 3, one, 1, two, square, pnewdt, &
             unused, square, f, 1, 1, 1, 1, jstep, 1)
         e = matmul(transpose(f), f) / 2
@@ -151,8 +152,10 @@ contains
         list = 1
         pnewdt = -1
         one = 1d6
-        call umat_user(repeat('x', 80), 1, 1, -101, one, emec, six, six, square, unused, square, unused, list, &
-            unused, unused, unused, unused, icmd, 0, list, 3, before, after, s, stiff, 0, three, orab, pnewdt, &
+        call umat_user(repeat('x', 80), 1, 1, -101, one, emec, six, six, square, unused, square, unused, \
+        list, &
+            unused, unused, unused, unused, icmd, 0, list, 3, before, after, s, stiff, 0, three, orab, \
+            pnewdt, &
             list)
     end subroutine material
 end program main

@@ -65,7 +65,8 @@ fn unloading_and_replicas() {
     let text = input::deform(&protocol, &run, "d", "o");
     for line in [
         "variable        vz equal $(lz)*-1e-5\nvariable        vxz equal $(lz)*-2e-5\n\
-                     fix             pull all deform 1 z erate 1e-5 xz erate 2e-5 remap x units box flip no\n",
+                     fix             pull all deform 1 z erate 1e-5 xz erate 2e-5 remap x units box flip \
+                     no\n",
         "run             3000\nunfix           pull\n\
                      fix             pull all deform 1 z vel ${vz} xz vel ${vxz} remap x units box flip no\n\
                      run             2000\n",

@@ -42,7 +42,8 @@ harness::quantities! {
 }
 
 harness::quantities! {
-    /// Scalars of models; `{set}` is `training`, `validation`, `test`, `heldout.RUN`, `run.RUN` or `all_runs`.
+    /// Scalars of models; `{set}` is `training`, `validation`, `test`, `heldout.RUN`, `run.RUN` or
+    /// `all_runs`.
     pub MODEL_QUANTITIES:
     PARAMETERS = "{model}.parameters", "", "number of parameters of a network, for one member";
     SPREAD_LIMIT = "{model}.spread_limit", "MPa",

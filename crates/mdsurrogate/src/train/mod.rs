@@ -3,8 +3,8 @@
 //!
 //! [`fit`] trains a law to the end; [`Training`] trains one network epoch by epoch. Its [`TrainingState`]
 //! contains everything that changes: a training resumed from a stored state gives bit-identical weights, as
-//! does a repetition. [`ensemble`] combines several networks in a law; [`Surrogate::with_spread_limit`] sets the
-//! limit of their disagreement.
+//! does a repetition. [`ensemble`] combines several networks in a law; [`Surrogate::with_spread_limit`] sets
+//! the limit of their disagreement.
 //!
 //! ```
 //! use mdsurrogate::dataset::{Dataset, Path, DataRow};

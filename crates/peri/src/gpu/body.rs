@@ -67,10 +67,12 @@ pub struct DeviceBody<const D: usize> {
 }
 
 impl<const D: usize> DeviceBody<D> {
-    /// Puts particles, intact bonds and a law q(e) with its modulus kθ, N/m⁶, on a device, without loads, at rest, undeformed.
+    /// Puts particles, intact bonds and a law q(e) with its modulus kθ, N/m⁶, on a device, without loads, at
+    /// rest, undeformed.
     ///
     /// # Errors
-    /// [`Error::Device`] for bonds and laws that kernels do not know, and for a body that the device's memory does not hold.
+    /// [`Error::Device`] for bonds and laws that kernels do not know, and for a body that the device's memory
+    /// does not hold.
     pub fn new(
         device: &Device,
         bonds: &LatticeBonds<D>,
@@ -159,7 +161,8 @@ impl<const D: usize> DeviceBody<D> {
         let law = Rational::new(fit).filter(|_| self.unit > 0.0 && self.unit.is_finite());
         let Some(law) = law else {
             return Err(Error::Device(format!(
-                "law of the bonds: unexpected {} with a force of {} N/m³; kernels take polynomials and rationals above 0",
+                "law of the bonds: unexpected {} with a force of {} N/m³; kernels take polynomials and \
+                 rationals above 0",
                 fit.kind(),
                 self.unit
             )));
@@ -194,7 +197,8 @@ impl<const D: usize> DeviceBody<D> {
         }
     }
 
-    /// Takes intact bonds, displacement, m, velocity, m/s, and force density, N/m³; `time_step`, s, is that of velocities on the device.
+    /// Takes intact bonds, displacement, m, velocity, m/s, and force density, N/m³; `time_step`, s, is that
+    /// of velocities on the device.
     ///
     /// # Errors
     /// [`Error::Geometry`] for the fields of another body.
@@ -231,8 +235,8 @@ impl<const D: usize> DeviceBody<D> {
     /// Force densities, N/m³, in a displacement, m, without body forces.
     ///
     /// # Errors
-    /// [`Error::NotFinite`] for forces that are not finite; [`Error::Geometry`] for the field of another body;
-    /// [`Error::Device`] where the device fails.
+    /// [`Error::NotFinite`] for forces that are not finite; [`Error::Geometry`] for the field of another
+    /// body; [`Error::Device`] where the device fails.
     pub fn force(&self, bonds: &LatticeBonds<D>, displacement: &Field<D>) -> Result<Field<D>, Error> {
         self.fits(&[displacement.sites(), bonds.sites()])?;
         let there = upload(&self.client, self.precision, displacement, 1.0 / self.spacing);
@@ -298,7 +302,8 @@ fn upload<const D: usize>(client: &Client, precision: Precision, field: &Field<D
 
 pub(super) fn numbers(client: &Client, precision: Precision, values: impl Iterator<Item = f64>) -> Handle {
     match precision {
-        // not beyond the range of single precision: ends of a law may be infinite, and no kernel has to know that
+        // not beyond the range of single precision: ends of a law may be infinite, and no kernel has to know
+        // that
         Precision::Single => {
             let single = |x: f64| if x.is_infinite() { f32::MAX.copysign(x as f32) } else { x as f32 };
             client.create_from_slice(f32::as_bytes(&values.map(single).collect::<Vec<_>>()))

@@ -72,7 +72,8 @@ impl<const D: usize> DeviceBody<D> {
         }
     }
 
-    /// Forces of the present displacement with body forces at a load factor. Where it `looks`, [`Self::look`] has what it saw.
+    /// Forces of the present displacement with body forces at a load factor. Where it `looks`, [`Self::look`]
+    /// has what it saw.
     pub fn pull(&mut self, factor: f64, looks: bool) {
         if looks {
             self.count = self.client.create_from_slice(u32::as_bytes(&[0]));
@@ -159,7 +160,8 @@ impl<const D: usize> DeviceBody<D> {
         }
     }
 
-    /// Extremes of e over all intact bonds in the last forces that looked, and how many ends of bonds are listed.
+    /// Extremes of e over all intact bonds in the last forces that looked, and how many ends of bonds are
+    /// listed.
     ///
     /// # Errors
     /// [`Error::Device`] where the device fails.

@@ -105,8 +105,8 @@ mod tests {
         assert!(MeshSection::through_the_middle(&mesh, &[]).is_none());
     }
 
-    /// A tetrahedron fills the triangle of its section, not its bounding box; a brick of tetrahedra fills the whole
-    /// section.
+    /// A tetrahedron fills the triangle of its section, not its bounding box; a brick of tetrahedra fills the
+    /// whole section.
     #[test]
     fn tetrahedra_are_cut() {
         let points = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];

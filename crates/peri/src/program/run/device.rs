@@ -21,7 +21,8 @@ pub enum Card {}
 pub struct Chosen {
     /// The card; `None`: the processor.
     pub card: Option<Card>,
-    /// Name of the device and its precision, or the reason for the processor, where the scene does not name that.
+    /// Name of the device and its precision, or the reason for the processor, where the scene does not name
+    /// that.
     pub note: Option<String>,
 }
 

@@ -173,9 +173,11 @@ pub enum DeviceChoice {
     /// The processor.
     #[default]
     Cpu,
-    /// A graphics card: a lattice of a bond law, without contact, inclusions, surface correction and rotations.
+    /// A graphics card: a lattice of a bond law, without contact, inclusions, surface correction and
+    /// rotations.
     Gpu,
-    /// A graphics card where there is one that can do it and the body is large enough to gain by it, the processor otherwise.
+    /// A graphics card where there is one that can do it and the body is large enough to gain by it, the
+    /// processor otherwise.
     Auto,
 }
 
@@ -190,7 +192,8 @@ impl DeviceChoice {
     }
 }
 
-/// Precision of bond forces on a lattice; everything else is in double precision, but on a graphics card in single precision.
+/// Precision of bond forces on a lattice; everything else is in double precision, but on a graphics card in
+/// single precision.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ForcePrecision {

@@ -136,7 +136,8 @@ impl TestColumns {
             (place(0, &|what| stress(what).is_some()), place(1, &|what| strain(what).is_some()));
         if biaxial && stress_1.zip(strain_2).is_some_and(|(stress, strain)| stress < strain) {
             let allowed = "`strain_column` and `stress_column` in the data's entry, if these are specimens \
-                           side by side (an entry each); for a biaxial test both strains before both stresses";
+                           side by side (an entry each); for a biaxial test both strains before both \
+                           stresses";
             return Err(file.refuse_headings(allowed));
         }
         let axes = if biaxial { vec![Some(0), Some(1)] } else { vec![None] };
