@@ -1,5 +1,6 @@
-//! An elastic block in motion, on a device and by the host's kernel: bonds, steps, seconds, directed bonds a second, and how far
-//! forces are apart. `cargo bench -p peri --no-default-features --features gpu --bench gpu -- 60 100`: 60³ particles, 100 steps.
+//! An elastic block in motion, on a device and by the host's kernel: bonds, steps, seconds, directed bonds a
+//! second, and how far forces are apart. `cargo bench -p peri --no-default-features --features gpu --bench
+//! gpu -- 60 100`: 60³ particles, 100 steps.
 
 use peri::bonds::{BodyGeometry, BondDamage, BondForces, LatticeBonds, force};
 use peri::calibrate::{Space, modulus};
@@ -59,7 +60,9 @@ fn measure<const D: usize>(cells: u32, steps: u64) -> Result<(), Box<dyn std::er
         body.set_state(&bonds, [&displacement, &zero, &found], time_step)?;
         let (name, error) = (device.name().to_owned(), largest_apart(&found, &expected));
         println!("  {name}, {precision:?}: forces off by {error:.1e} of the largest");
-        for (what, pulls, looks) in [("forces", true, false), ("forces that look", true, true), ("steps", false, false)] {
+        for (what, pulls, looks) in
+            [("forces", true, false), ("forces that look", true, true), ("steps", false, false)]
+        {
             let take = |body: &mut DeviceBody<D>, steps: usize| -> Result<StepSums, peri::Error> {
                 let mut last = StepSums::default();
                 for taken in 0..steps {

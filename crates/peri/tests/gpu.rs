@@ -45,8 +45,9 @@ fn damaged<const D: usize>(cells: [usize; D]) -> LatticeBonds<D> {
     Body { surface: None, ..Body::damaged(cells, 1e-3, 3.015) }.build().lattice
 }
 
-/// What rounding of displacements, of the law and of sums may make of a particle's force: with c = 2kθ w V/|ξ| and the rounding
-/// ε|ξ + η|(|u_I| + |u_J|) of E, of which q is a function, Σ_J c (|q| + |q′| |δE|/ε + |q|)|ζ|.
+/// What rounding of displacements, of the law and of sums may make of a particle's force: with c = 2kθ w
+/// V/|ξ| and the rounding ε|ξ + η|(|u_I| + |u_J|) of E, of which q is a function, Σ_J c (|q| + |q′| |δE|/ε +
+/// |q|)|ζ|.
 fn sizes<const D: usize>(bonds: &LatticeBonds<D>, law: &KernelFit, u: &Field<D>) -> Vec<f64> {
     let of = |site: u32| {
         let mut size = 0.0;
@@ -87,7 +88,8 @@ fn compare_forces<const D: usize>(device: &Device, cells: [usize; D]) {
             // a particle without bonds has neither
             worst = worst.max(if apart == 0.0 { 0.0 } else { apart / (size * device.precision().epsilon()) });
         }
-        // a bond's force is rounded in ten to fifty operations, each by up to ½ε, in directions that have nothing in common
+        // a bond's force is rounded in ten to fifty operations, each by up to ½ε, in directions that have
+        // nothing in common
         let name =
             format!("{D}D {} forces of {} in {:?}, in ε Σ|f|", law.name(), device.name(), device.precision());
         eprintln!("{name}: {worst:.2}");
@@ -103,7 +105,8 @@ fn gpu_forces_are_those_of_the_host() {
     }
 }
 
-/// A run of a system, by the host or on a device: the state at the end, and the bonds intact and broken after each row of history.
+/// A run of a system, by the host or on a device: the state at the end, and the bonds intact and broken after
+/// each row of history.
 struct Ran<const D: usize> {
     state: State<D>,
     rows: Vec<(Vec<u64>, u64)>,
@@ -139,8 +142,9 @@ impl<const D: usize> Case<D> {
         Ok(Ran { state, rows })
     }
 
-    /// Compares a run on a device with the host's: the same bonds break in the same row of history, and in double precision in the
-    /// same step; energies and displacements agree to `allowed` times the host's greatest.
+    /// Compares a run on a device with the host's: the same bonds break in the same row of history, and in
+    /// double precision in the same step; energies and displacements agree to `allowed` times the host's
+    /// greatest.
     fn compare(&self, name: &str, device: &Device, build: &dyn Fn() -> LatticeBonds<D>, allowed: f64) {
         let host = self.run(&mut build(), None).unwrap();
         let found = self.run(&mut build(), Some(device)).unwrap();
@@ -150,7 +154,10 @@ impl<const D: usize> Case<D> {
         if !same {
             let events = found.state.fracture.events.iter().zip(&host.state.fracture.events);
             let first = events.enumerate().find(|(_, (a, b))| a != b);
-            eprintln!("{name}: {} and {} bonds, first difference {first:?}", found.state.fracture.broken, host.state.fracture.broken);
+            eprintln!(
+                "{name}: {} and {} bonds, first difference {first:?}",
+                found.state.fracture.broken, host.state.fracture.broken
+            );
         }
         assert!(same || device.precision() == Precision::Single, "{name}: other bonds broke");
         if !same {
@@ -182,7 +189,10 @@ impl<const D: usize> Case<D> {
                 assert!(apart <= allowed, "{name}, {what} at {} s: {a:e} {b:e}", host.time);
             }
         }
-        eprintln!("{name}: {} steps, {} bonds broke", host.state.counts.total_iterations, host.state.fracture.broken);
+        eprintln!(
+            "{name}: {} steps, {} bonds broke",
+            host.state.counts.total_iterations, host.state.fracture.broken
+        );
     }
 }
 
@@ -257,8 +267,7 @@ fn gpu_kalthoff_winkler() {
         }
         let step = (DENSITY / (2.0 * stiffest)).sqrt();
         let end_time = 200.0 * step;
-        let solver =
-            VelocityVerlet { ramp: end_time, records: 8, ..VelocityVerlet::new(DENSITY, end_time) };
+        let solver = VelocityVerlet { ramp: end_time, records: 8, ..VelocityVerlet::new(DENSITY, end_time) };
         let velocity = Field::zeros(bonds.sites());
         let case = Case { loads, velocity, critical: Some(1.02), solver, law: Law::Linear };
         let host = case.run(&mut build(), None).unwrap();
@@ -344,7 +353,8 @@ fn gpu_bodies_beyond_the_memory() {
     if most > 1 << 25 {
         return evidence::skipped("a device with small buffers");
     }
-    // three sites a cell, with the empty ones on either side of the row: within the limit in single precision, beyond it in double
+    // three sites a cell, with the empty ones on either side of the row: within the limit in single
+    // precision, beyond it in double
     let cells = [most as usize / 2, 1];
     let row = Lattice { spacing: 1.0, origin: [0.5; 2], cells, occupied: vec![true; cells[0]], volume: 1.0 };
     let bonds = LatticeBonds::new(row, 1.0, VolumeCorrection::None, &[]).unwrap();

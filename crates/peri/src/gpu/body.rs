@@ -1,6 +1,6 @@
 //! A lattice on a device: its buffers, and the launches of its kernels.
 
-use super::kernels::{CUBE, Form, ROW, SUMS};
+use super::kernels::{CUBE, KernelForm, ROW, SUMS};
 use super::{Device, Precision};
 use crate::bonds::{BodyGeometry, BondDamage, LatticeBonds, Rational, not_finite};
 use crate::error::Error;
@@ -37,7 +37,7 @@ pub struct DeviceLoads<'a, const D: usize> {
 pub struct DeviceBody<const D: usize> {
     pub(super) client: Client,
     pub(super) precision: Precision,
-    pub(super) form: Form,
+    pub(super) form: KernelForm,
     pub(super) sites: usize,
     pub(super) particles: usize,
     pub(super) spacing: f64,
@@ -67,10 +67,12 @@ pub struct DeviceBody<const D: usize> {
 }
 
 impl<const D: usize> DeviceBody<D> {
-    /// Puts particles, intact bonds and a law q(e) with its modulus kθ, N/m⁶, on a device, without loads, at rest, undeformed.
+    /// Puts particles, intact bonds and a law q(e) with its modulus kθ, N/m⁶, on a device, without loads, at
+    /// rest, undeformed.
     ///
     /// # Errors
-    /// [`Error::Device`] for bonds and laws that kernels do not know, and for a body that the device's memory does not hold.
+    /// [`Error::Device`] for bonds and laws that kernels do not know, and for a body that the device's memory
+    /// does not hold.
     pub fn new(
         device: &Device,
         bonds: &LatticeBonds<D>,
@@ -84,7 +86,7 @@ impl<const D: usize> DeviceBody<D> {
         let precision = device.precision;
         let (sites, particles) = (bonds.sites(), bonds.particles().len());
         let stencil = bonds.stencil_bonds(modulus);
-        let form = Form {
+        let form = KernelForm {
             dimension: D,
             bonds: stencil.len(),
             numerator: 1,
@@ -164,7 +166,7 @@ impl<const D: usize> DeviceBody<D> {
                 self.unit
             )));
         };
-        self.form = Form {
+        self.form = KernelForm {
             numerator: law.numerator.len(),
             denominator: law.denominator.len(),
             clamped: law.clamp.iter().any(|end| end.is_finite()),
@@ -194,7 +196,8 @@ impl<const D: usize> DeviceBody<D> {
         }
     }
 
-    /// Takes intact bonds, displacement, m, velocity, m/s, and force density, N/m³; `time_step`, s, is that of velocities on the device.
+    /// Takes intact bonds, displacement, m, velocity, m/s, and force density, N/m³; `time_step`, s, is that
+    /// of velocities on the device.
     ///
     /// # Errors
     /// [`Error::Geometry`] for the fields of another body.
@@ -210,8 +213,7 @@ impl<const D: usize> DeviceBody<D> {
         self.intact = self.client.create_from_slice(u32::as_bytes(&intact));
         let scales = [1.0 / self.spacing, time_step / self.spacing, 1.0 / self.unit];
         let fields = [displacement, velocity, force];
-        self.fields =
-            std::array::from_fn(|k| upload(&self.client, self.precision, fields[k], scales[k]));
+        self.fields = std::array::from_fn(|k| upload(&self.client, self.precision, fields[k], scales[k]));
         Ok(())
     }
 
@@ -232,13 +234,13 @@ impl<const D: usize> DeviceBody<D> {
     /// Force densities, N/m³, in a displacement, m, without body forces.
     ///
     /// # Errors
-    /// [`Error::NotFinite`] for forces that are not finite; [`Error::Geometry`] for the field of another body;
-    /// [`Error::Device`] where the device fails.
+    /// [`Error::NotFinite`] for forces that are not finite; [`Error::Geometry`] for the field of another
+    /// body; [`Error::Device`] where the device fails.
     pub fn force(&self, bonds: &LatticeBonds<D>, displacement: &Field<D>) -> Result<Field<D>, Error> {
         self.fits(&[displacement.sites(), bonds.sites()])?;
         let there = upload(&self.client, self.precision, displacement, 1.0 / self.spacing);
         let found = upload(&self.client, self.precision, &Field::<D>::zeros(self.sites), 1.0);
-        let form = Form { loaded: false, ..self.form };
+        let form = KernelForm { loaded: false, ..self.form };
         self.launch_pull([&there, &found], (&self.sites_of_particles, self.particles), 0.0, form, false);
         let force = self.download(&found, self.unit)?;
         match force.non_finite() {
@@ -297,13 +299,10 @@ fn upload<const D: usize>(client: &Client, precision: Precision, field: &Field<D
     numbers(client, precision, field.components().into_iter().flatten().map(|x| x * scale))
 }
 
-pub(super) fn numbers(
-    client: &Client,
-    precision: Precision,
-    values: impl Iterator<Item = f64>,
-) -> Handle {
+pub(super) fn numbers(client: &Client, precision: Precision, values: impl Iterator<Item = f64>) -> Handle {
     match precision {
-        // not beyond the range of single precision: ends of a law may be infinite, and no kernel has to know that
+        // not beyond the range of single precision: ends of a law may be infinite, and no kernel has to know
+        // that
         Precision::Single => {
             let single = |x: f64| if x.is_infinite() { f32::MAX.copysign(x as f32) } else { x as f32 };
             client.create_from_slice(f32::as_bytes(&values.map(single).collect::<Vec<_>>()))

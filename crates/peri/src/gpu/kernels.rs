@@ -1,27 +1,29 @@
-//! Kernels of a lattice in motion. Fields lie component by component, as in [`crate::field::Field`]; lengths are in spacings and
-//! velocities in spacings a step. No kernel checks its indices: buffers have the lengths that [`super::body`] gives them.
+//! Kernels of a lattice in motion. Fields lie component by component, as in [`crate::field::Field`]; lengths
+//! are in spacings and velocities in spacings a step. No kernel checks its indices: buffers have the lengths
+//! that [`super::body`] gives them.
 
 use cubecl::ir::ElemType;
 use cubecl::prelude::*;
 
 /// Threads of a cube.
 pub const CUBE: usize = 128;
-/// Sums of the first half of a step: force times increment where held, velocity times increment where free, body force times
-/// increment, greatest increment.
+/// Sums of the first half of a step: force times increment where held, velocity times increment where free,
+/// body force times increment, greatest increment.
 pub const LEAP_SUMS: usize = 4;
-/// Sums of the second half: v², force times increment where held, gain of v² where held, velocity times increment where free,
-/// body force times increment.
+/// Sums of the second half: v², force times increment where held, gain of v² where held, velocity times
+/// increment where free, body force times increment.
 pub const KICK_SUMS: usize = 5;
 /// Sums of a step.
 pub const SUMS: usize = LEAP_SUMS + KICK_SUMS;
 /// Numbers of a bond: ξ, 1/|ξ|², stiffness.
 pub const ROW: usize = 2;
-/// Numbers of a law beyond its coefficients: value at e = 0, least and greatest e, the e from which bonds are listed.
+/// Numbers of a law beyond its coefficients: value at e = 0, least and greatest e, the e from which bonds are
+/// listed.
 pub const ENDS: usize = 4;
 
 /// Constants that kernels are compiled for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Form {
+pub struct KernelForm {
     /// Dimension of the body.
     pub dimension: usize,
     /// Bonds of the stencil.
@@ -44,7 +46,7 @@ pub struct Form {
     pub unroll: usize,
 }
 
-impl Form {
+impl KernelForm {
     /// Numbers of the law.
     pub fn law(&self) -> usize {
         self.numerator + self.denominator + ENDS
@@ -64,7 +66,7 @@ fn add_bond<F: Float>(
     site: u32,
     k: usize,
     #[comptime] p: usize,
-    #[comptime] form: Form,
+    #[comptime] form: KernelForm,
 ) -> F {
     let dimension = comptime!(form.dimension);
     let sites = displacement.len() / dimension;
@@ -112,14 +114,7 @@ fn add_bond<F: Float>(
 
 /// Lists a bond, and counts it where the list is full.
 #[cube]
-fn note<F: Float>(
-    count: &[Atomic<u32>],
-    list: &mut [u32],
-    elongations: &mut [F],
-    site: u32,
-    k: usize,
-    e: F,
-) {
+fn note<F: Float>(count: &[Atomic<u32>], list: &mut [u32], elongations: &mut [F], site: u32, k: usize, e: F) {
     let place = count[0].fetch_add(1u32) as usize;
     if place < elongations.len() {
         list[2 * place] = site;
@@ -128,8 +123,9 @@ fn note<F: Float>(
     }
 }
 
-/// Force densities Σ_J c q(e) ζ of particles, with e = η·(2ξ + η)/|ξ|², plus `factor` times the body force. Where it `looks`, each
-/// thread writes the least and greatest e of its bonds, and lists bonds beyond the law's last number.
+/// Force densities Σ_J c q(e) ζ of particles, with e = η·(2ξ + η)/|ξ|², plus `factor` times the body force.
+/// Where it `looks`, each thread writes the least and greatest e of its bonds, and lists bonds beyond the
+/// law's last number.
 ///
 /// The two ends of a bond find the same bits of e.
 #[cube(launch_unchecked)]
@@ -148,7 +144,7 @@ pub fn pull<F: Float>(
     list: &mut [u32],
     elongations: &mut [F],
     factor: InputScalar,
-    #[comptime] form: Form,
+    #[comptime] form: KernelForm,
     #[comptime] looks: bool,
     #[define(F)] _precision: ElemType,
 ) {
@@ -294,8 +290,8 @@ pub fn pull<F: Float>(
     }
 }
 
-/// The half kick of the free components, v ← `keep`·v + `push`·f, and u ← u + v; held components go to `after` times the full
-/// displacement. Each thread writes its [`LEAP_SUMS`].
+/// The half kick of the free components, v ← `keep`·v + `push`·f, and u ← u + v; held components go to
+/// `after` times the full displacement. Each thread writes its [`LEAP_SUMS`].
 #[cube(launch_unchecked)]
 #[allow(clippy::too_many_arguments)]
 pub fn leap<F: Float>(
@@ -311,7 +307,7 @@ pub fn leap<F: Float>(
     keep: InputScalar,
     push: InputScalar,
     after: InputScalar,
-    #[comptime] form: Form,
+    #[comptime] form: KernelForm,
     #[define(F)] _precision: ElemType,
 ) {
     let dimension = comptime!(form.dimension);
@@ -367,8 +363,8 @@ pub fn leap<F: Float>(
     partial[3 * threads + ABSOLUTE_POS] = greatest;
 }
 
-/// The second half kick of the free components, v ← `keep`·(v + `push`·f); held components have `rate` times the full displacement
-/// and have moved by `gain` times it. Each thread writes its [`KICK_SUMS`].
+/// The second half kick of the free components, v ← `keep`·(v + `push`·f); held components have `rate` times
+/// the full displacement and have moved by `gain` times it. Each thread writes its [`KICK_SUMS`].
 #[cube(launch_unchecked)]
 #[allow(clippy::too_many_arguments)]
 pub fn kick<F: Float>(
@@ -383,7 +379,7 @@ pub fn kick<F: Float>(
     push: InputScalar,
     rate: InputScalar,
     gain: InputScalar,
-    #[comptime] form: Form,
+    #[comptime] form: KernelForm,
     #[define(F)] _precision: ElemType,
 ) {
     let dimension = comptime!(form.dimension);
@@ -439,8 +435,8 @@ pub fn kick<F: Float>(
     partial[start + 4 * threads] = body_work;
 }
 
-/// Sums, or extremes, of `rows` lists: thread i of `lanes` takes every `lanes`th number from i on, in order. Bit r of `greatest` and
-/// `least`: list r has its extreme taken.
+/// Sums, or extremes, of `rows` lists: thread i of `lanes` takes every `lanes`th number from i on, in order.
+/// Bit r of `greatest` and `least`: list r has its extreme taken.
 #[cube(launch_unchecked)]
 pub fn fold<F: Float>(
     from: &[F],

@@ -1,12 +1,15 @@
 //! Lattices on a graphics card (feature `gpu`): velocity Verlet with bonds that break.
 //!
-//! A [`Device`] is a card, or a program that stands for one; [`DeviceBody`] is a lattice on it, with the stencil, the fitted law and
-//! the bits of intact bonds of the host's kernel (see [`crate::potential::KernelFit`]). The kernels are written once, in Rust, and
-//! compiled for the device when they first run ([`cubecl`](https://docs.rs/cubecl)). Lengths are in spacings there and velocities in
-//! spacings a step, so that nothing leaves the range of single precision; stretches come from differences of displacements.
+//! A [`Device`] is a card, or a program that stands for one; [`DeviceBody`] is a lattice on it, with the
+//! stencil, the fitted law and the bits of intact bonds of the host's kernel (see
+//! [`crate::potential::KernelFit`]). The kernels are written once, in Rust, and compiled for the device when
+//! they first run ([`cubecl`](https://docs.rs/cubecl)). Lengths are in spacings there and velocities in
+//! spacings a step, so that nothing leaves the range of single precision; stretches come from differences of
+//! displacements.
 //!
-//! [`VelocityVerlet::solve_on`](crate::solver::VelocityVerlet::solve_on) takes the steps of a [`System`](crate::solver::System) on a
-//! device: the host decides as it does without one, from sums of each step, and fetches fields for rows of the history only.
+//! [`VelocityVerlet::solve_on`](crate::solver::VelocityVerlet::solve_on) takes the steps of a
+//! [`System`](crate::solver::System) on a device: the host decides as it does without one, from sums of each
+//! step, and fetches fields for rows of the history only.
 
 mod body;
 mod kernels;
@@ -57,8 +60,9 @@ pub struct Device {
 }
 
 impl Device {
-    /// A card behind Vulkan, Metal or DirectX 12, the fastest there is; where there is no card, a program that stands for one
-    /// (Mesa's lavapipe). `CUBECL_WGPU_DEFAULT_DEVICE` names another one: `DiscreteGpu(1)`, `Cpu`.
+    /// A card behind Vulkan, Metal or DirectX 12, the fastest there is; where there is no card, a program
+    /// that stands for one (Mesa's lavapipe). `CUBECL_WGPU_DEFAULT_DEVICE` names another one:
+    /// `DiscreteGpu(1)`, `Cpu`.
     ///
     /// # Errors
     /// [`Error::Device`] where this machine has none.
@@ -66,8 +70,8 @@ impl Device {
         Self::open(cubecl::Device::wgpu(WgpuDeviceKind::default()))
     }
 
-    /// The card that CUDA counts as `index`, in programs that depend on `cubecl` with its feature `cuda`: this crate does not turn it
-    /// on, as its build downloads a compiler from GitHub.
+    /// The card that CUDA counts as `index`, in programs that depend on `cubecl` with its feature `cuda`:
+    /// this crate does not turn it on, as its build downloads a compiler from GitHub.
     ///
     /// # Errors
     /// [`Error::Device`] where this machine has none, or this build no CUDA.
@@ -82,7 +86,7 @@ impl Device {
         Ok(Self { client, precision })
     }
 
-    /// Whether it is a card, and no program that stands for one.
+    /// True for a card, false for a program that stands for one.
     pub fn is_card(&self) -> bool {
         self.client.properties().identity.physical.is_some()
     }
@@ -92,8 +96,8 @@ impl Device {
         &self.client.properties().identity.name
     }
 
-    /// Bytes that a buffer may have: a field of a body, of D numbers a site, must fit into one. At most 4 GiB, as kernels count in
-    /// 32 bits.
+    /// Bytes that a buffer may have: a field of a body, of D numbers a site, must fit into one. At most 4
+    /// GiB, as kernels count in 32 bits.
     pub fn largest_buffer(&self) -> u64 {
         self.client.properties().memory.max_page_size.min(1 << 32)
     }

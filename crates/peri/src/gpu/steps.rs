@@ -1,7 +1,7 @@
 //! Steps of velocity Verlet on a device: launches of its kernels, and what the host reads of them.
 
 use super::body::{DeviceBody, FOLDED, LANES, LISTED, MOST_STEPS, cubes, failed};
-use super::kernels::{CUBE, Form, LEAP_SUMS, SUMS, copy, fold, kick, leap, pull, scatter};
+use super::kernels::{CUBE, KernelForm, LEAP_SUMS, SUMS, copy, fold, kick, leap, pull, scatter};
 use crate::bonds::StretchRange;
 use crate::error::Error;
 use cubecl::ir::{ElemType, UIntKind};
@@ -65,14 +65,15 @@ impl<const D: usize> DeviceBody<D> {
                 number(ratio),
                 number(1.0 - half),
                 number(push),
-                number(step.factors[1] ),
+                number(step.factors[1]),
                 self.form,
                 self.precision.element(),
             );
         }
     }
 
-    /// Forces of the present displacement with body forces at a load factor. Where it `looks`, [`Self::look`] has what it saw.
+    /// Forces of the present displacement with body forces at a load factor. Where it `looks`, [`Self::look`]
+    /// has what it saw.
     pub fn pull(&mut self, factor: f64, looks: bool) {
         if looks {
             self.count = self.client.create_from_slice(u32::as_bytes(&[0]));
@@ -86,7 +87,7 @@ impl<const D: usize> DeviceBody<D> {
     pub fn pull_at(&self, sites: &[u32], factor: f64) {
         let [displacement, _, force] = &self.fields;
         let some = self.client.create_from_slice(u32::as_bytes(sites));
-        let form = Form { tile: 1, ..self.form };
+        let form = KernelForm { tile: 1, ..self.form };
         self.launch_pull([displacement, force], (&some, sites.len()), factor, form, false);
     }
 
@@ -153,12 +154,14 @@ impl<const D: usize> DeviceBody<D> {
                 mass * speed * speed * sum(kick + 2) + 0.5 * work * (after * sum(kick + 4) - sum(kick + 1)),
             ],
             damped: [damping * sum(1), damping * sum(kick + 3)],
-            increment: self.spacing * lists[LEAP_SUMS - 1].iter().fold(0.0_f64, |most, &x| if most >= x { most } else { x }),
+            increment: self.spacing
+                * lists[LEAP_SUMS - 1].iter().fold(0.0_f64, |most, &x| if most >= x { most } else { x }),
             kinetic: mass * speed * speed * sum(kick),
         }
     }
 
-    /// Extremes of e over all intact bonds in the last forces that looked, and how many ends of bonds are listed.
+    /// Extremes of e over all intact bonds in the last forces that looked, and how many ends of bonds are
+    /// listed.
     ///
     /// # Errors
     /// [`Error::Device`] where the device fails.
@@ -267,7 +270,7 @@ impl<const D: usize> DeviceBody<D> {
         [displacement, force]: [&Handle; 2],
         (sites, count): (&Handle, usize),
         factor: f64,
-        form: Form,
+        form: KernelForm,
         looks: bool,
     ) {
         let element = self.precision.element();

@@ -362,7 +362,12 @@ impl VelocityVerlet {
     }
 
     /// Energies of a step, and whether they may be.
-    pub(super) fn account<const D: usize>(&self, state: &mut State<D>, first: Sums, second: Sums) -> Result<(), Error> {
+    pub(super) fn account<const D: usize>(
+        &self,
+        state: &mut State<D>,
+        first: Sums,
+        second: Sums,
+    ) -> Result<(), Error> {
         let motion = &mut state.motion;
         motion.energies.kinetic = second.kinetic;
         motion.energies.damped += first.damped + second.damped;

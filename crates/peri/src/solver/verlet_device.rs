@@ -1,8 +1,9 @@
 //! Explicit dynamics on a graphics card: the host decides as [`VelocityVerlet`] does, from sums of each step.
 //!
-//! As long as no stretch can leave the fitted law or reach the critical one, several steps are taken before their sums are read; where
-//! the sums show that stretches were to be looked at on the way, the card goes back to that step. Otherwise a step is taken at a time,
-//! and the stretches that its forces meet are looked at.
+//! As long as no stretch can leave the fitted law or reach the critical one, several steps are taken before
+//! their sums are read; where the sums show that stretches were to be looked at on the way, the card goes
+//! back to that step. Otherwise a step is taken at a time, and the stretches that its forces meet are looked
+//! at.
 
 use super::criterion::Criterion;
 use super::method::{Finished, Watch};
@@ -26,8 +27,8 @@ struct Run<const D: usize> {
 }
 
 impl VelocityVerlet {
-    /// As [`Method::solve`](super::Method::solve), with steps on a device: of a lattice of a bond law, without contact and turned regions.
-    /// `watch` may keep the state after a row of history only.
+    /// As [`Method::solve`](super::Method::solve), with steps on a device: of a lattice of a bond law,
+    /// without contact and turned regions. `watch` may keep the state after a row of history only.
     ///
     /// # Errors
     /// As there; [`Error::Device`] for what the device cannot do, or where it fails.
@@ -285,9 +286,8 @@ fn critical<'a, const D: usize>(system: &'a System<D>) -> Option<&'a Property> {
 
 /// e from which bonds are listed: those that break, and some within rounding of them.
 fn limit<const D: usize>(system: &System<D>) -> f64 {
-    critical(system).map_or(f64::INFINITY, |critical| {
-        (critical.least() * critical.least() - 1.0) * (1.0 - 1e-6) - 1e-12
-    })
+    critical(system)
+        .map_or(f64::INFINITY, |critical| (critical.least() * critical.least() - 1.0) * (1.0 - 1e-6) - 1e-12)
 }
 
 /// Refuses what only the host can do.

@@ -21,7 +21,8 @@ pub enum Card {}
 pub struct Chosen {
     /// The card; `None`: the processor.
     pub card: Option<Card>,
-    /// Name of the device and its precision, or the reason for the processor, where the scene does not name that.
+    /// Name of the device and its precision, or the reason for the processor, where the scene does not name
+    /// that.
     pub note: Option<String>,
 }
 
@@ -44,18 +45,28 @@ pub fn choose<const D: usize>(
     };
     if let Some((key, found)) = beyond_cards(scene, bonds) {
         let allowed = "nothing of it on a graphics card; `dynamics.device = \"cpu\"` for the processor";
-        return if only { Err(source.error(&key, found, allowed)) } else { on_processor(format!("{found}, `{key}`")) };
+        return if only {
+            Err(source.error(&key, found, allowed))
+        } else {
+            on_processor(format!("{found}, `{key}`"))
+        };
     }
     let directed = bonds.directed_bonds();
     if !only && directed < FEWEST_BONDS {
         return on_processor(format!("{directed} directed bonds are too few to gain by a card"));
     }
     match open(dynamics) {
-        Ok((card, _)) if !only && !is_card(&card) => on_processor("this machine has no graphics card".to_owned()),
+        Ok((card, _)) if !only && !is_card(&card) => {
+            on_processor("this machine has no graphics card".to_owned())
+        }
         Ok((card, name)) => Ok(Chosen { card: Some(card), note: Some(name) }),
         Err(why) if only => {
             let found = format!("\"gpu\", but {why}");
-            Err(source.error("dynamics.device", found, "`\"cpu\"`, or `\"auto\"` to take a card where there is one"))
+            Err(source.error(
+                "dynamics.device",
+                found,
+                "`\"cpu\"`, or `\"auto\"` to take a card where there is one",
+            ))
         }
         Err(why) => on_processor(why),
     }
@@ -92,7 +103,11 @@ fn beyond_cards<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> Option<(
         ("body.points", scene.body.points.is_some(), "a body of points"),
         ("body.grid", scene.body.grid.is_some(), "a grid of cells"),
         ("material.solid", material.solid.is_some(), "a solid"),
-        ("material.fields", material.is_prestrained() || !material.fields.is_empty(), "fields of the material"),
+        (
+            "material.fields",
+            material.is_prestrained() || !material.fields.is_empty(),
+            "fields of the material",
+        ),
         ("material.inclusions", !material.inclusions.is_empty(), "inclusions"),
         ("material.critical.convention", scene.softens(), "bonds that soften"),
         ("material.surface_correction", !uniform, "bonds with surface factors"),
@@ -120,7 +135,8 @@ fn open(dynamics: &Dynamics) -> Result<(Card, String), String> {
 
 #[cfg(not(feature = "gpu"))]
 fn open(_: &Dynamics) -> Result<(Card, String), String> {
-    Err("this program was built without graphics cards: `cargo build --release -p peri --features gpu`".to_owned())
+    Err("this program was built without graphics cards: `cargo build --release -p peri --features gpu`"
+        .to_owned())
 }
 
 #[cfg(feature = "gpu")]
