@@ -81,7 +81,7 @@ fn gpu_scene_has_the_report_of_the_processor() {
         assert!(note.contains(device.name()) && note.contains(word), "{note}");
         if precision == Precision::Single {
             // a bond at its limit may break a step earlier or later
-            for name in ["broken_bonds", "largest_displacement", "external_work"] {
+            for name in ["broken_bonds", "largest_displacement", "work_of_loads"] {
                 let [value, expected] = [&found, &host].map(|run| run.outcomes[0].get(name).unwrap());
                 assert!((value / expected - 1.0).abs() <= 0.02, "{name}: {value:e} {expected:e}");
             }
