@@ -1,6 +1,6 @@
-//! Elastic block in motion, on a device and by the kernel of the host: bonds, steps, seconds, directed bonds
-//! per second, and the difference of forces. `cargo bench -p peri --no-default-features --features gpu
-//! --bench gpu -- 60 100`: 60³ particles, 100 steps.
+//! An elastic block in motion, on a device and by the host's kernel: bonds, steps, seconds, directed bonds a
+//! second, and how far forces are apart. `cargo bench -p peri --no-default-features --features gpu --bench
+//! gpu -- 60 100`: 60³ particles, 100 steps.
 
 use peri::bonds::{BodyGeometry, BondDamage, BondForces, LatticeBonds, force};
 use peri::calibrate::{Space, modulus};

@@ -46,8 +46,9 @@ fn damaged<const D: usize>(cells: [usize; D]) -> LatticeBonds<D> {
     Body { surface: None, ..Body::damaged(cells, 1e-3, 3.015) }.build().lattice
 }
 
-/// Bound of the rounding error of a particle's force, from displacements, law and sums: Σ_J c (|q| + |q′|
-/// |δE|/ε + |q|)|ζ| with c = 2kθ w V/|ξ| and the rounding ε|ξ + η|(|u_I| + |u_J|) of E, on which q depends.
+/// What rounding of displacements, of the law and of sums may make of a particle's force: with c = 2kθ w
+/// V/|ξ| and the rounding ε|ξ + η|(|u_I| + |u_J|) of E, of which q is a function, Σ_J c (|q| + |q′| |δE|/ε +
+/// |q|)|ζ|.
 fn sizes<const D: usize>(bonds: &LatticeBonds<D>, law: &KernelFit, u: &Field<D>) -> Vec<f64> {
     let of = |site: u32| {
         let mut size = 0.0;

@@ -1,6 +1,6 @@
 //! A lattice on a device: its buffers, and the launches of its kernels.
 
-use super::kernels::{CUBE, Form, ROW, SUMS};
+use super::kernels::{CUBE, KernelForm, ROW, SUMS};
 use super::{Device, Precision};
 use crate::bonds::{BodyGeometry, BondDamage, LatticeBonds, Rational, not_finite};
 use crate::error::Error;
@@ -37,7 +37,7 @@ pub struct DeviceLoads<'a, const D: usize> {
 pub struct DeviceBody<const D: usize> {
     pub(super) client: Client,
     pub(super) precision: Precision,
-    pub(super) form: Form,
+    pub(super) form: KernelForm,
     pub(super) sites: usize,
     pub(super) particles: usize,
     pub(super) spacing: f64,
@@ -86,7 +86,7 @@ impl<const D: usize> DeviceBody<D> {
         let precision = device.precision;
         let (sites, particles) = (bonds.sites(), bonds.particles().len());
         let stencil = bonds.stencil_bonds(modulus);
-        let form = Form {
+        let form = KernelForm {
             dimension: D,
             bonds: stencil.len(),
             numerator: 1,
@@ -167,7 +167,7 @@ impl<const D: usize> DeviceBody<D> {
                 self.unit
             )));
         };
-        self.form = Form {
+        self.form = KernelForm {
             numerator: law.numerator.len(),
             denominator: law.denominator.len(),
             clamped: law.clamp.iter().any(|end| end.is_finite()),
@@ -241,7 +241,7 @@ impl<const D: usize> DeviceBody<D> {
         self.fits(&[displacement.sites(), bonds.sites()])?;
         let there = upload(&self.client, self.precision, displacement, 1.0 / self.spacing);
         let found = upload(&self.client, self.precision, &Field::<D>::zeros(self.sites), 1.0);
-        let form = Form { loaded: false, ..self.form };
+        let form = KernelForm { loaded: false, ..self.form };
         self.launch_pull([&there, &found], (&self.sites_of_particles, self.particles), 0.0, form, false);
         let force = self.download(&found, self.unit)?;
         match force.non_finite() {

@@ -23,7 +23,7 @@ pub const ENDS: usize = 4;
 
 /// Constants that kernels are compiled for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Form {
+pub struct KernelForm {
     /// Dimension of the body.
     pub dimension: usize,
     /// Bonds of the stencil.
@@ -46,7 +46,7 @@ pub struct Form {
     pub unroll: usize,
 }
 
-impl Form {
+impl KernelForm {
     /// Numbers of the law.
     pub fn law(&self) -> usize {
         self.numerator + self.denominator + ENDS
@@ -66,7 +66,7 @@ fn add_bond<F: Float>(
     site: u32,
     k: usize,
     #[comptime] p: usize,
-    #[comptime] form: Form,
+    #[comptime] form: KernelForm,
 ) -> F {
     let dimension = comptime!(form.dimension);
     let sites = displacement.len() / dimension;
@@ -144,7 +144,7 @@ pub fn pull<F: Float>(
     list: &mut [u32],
     elongations: &mut [F],
     factor: InputScalar,
-    #[comptime] form: Form,
+    #[comptime] form: KernelForm,
     #[comptime] looks: bool,
     #[define(F)] _precision: ElemType,
 ) {
@@ -307,7 +307,7 @@ pub fn leap<F: Float>(
     keep: InputScalar,
     push: InputScalar,
     after: InputScalar,
-    #[comptime] form: Form,
+    #[comptime] form: KernelForm,
     #[define(F)] _precision: ElemType,
 ) {
     let dimension = comptime!(form.dimension);
@@ -379,7 +379,7 @@ pub fn kick<F: Float>(
     push: InputScalar,
     rate: InputScalar,
     gain: InputScalar,
-    #[comptime] form: Form,
+    #[comptime] form: KernelForm,
     #[define(F)] _precision: ElemType,
 ) {
     let dimension = comptime!(form.dimension);

@@ -86,7 +86,7 @@ impl Device {
         Ok(Self { client, precision })
     }
 
-    /// Whether it is a card, and no program that stands for one.
+    /// True for a card, false for a program that stands for one.
     pub fn is_card(&self) -> bool {
         self.client.properties().identity.physical.is_some()
     }

@@ -1,7 +1,7 @@
 //! Steps of velocity Verlet on a device: launches of its kernels, and what the host reads of them.
 
 use super::body::{DeviceBody, FOLDED, LANES, LISTED, MOST_STEPS, cubes, failed};
-use super::kernels::{CUBE, Form, LEAP_SUMS, SUMS, copy, fold, kick, leap, pull, scatter};
+use super::kernels::{CUBE, KernelForm, LEAP_SUMS, SUMS, copy, fold, kick, leap, pull, scatter};
 use crate::bonds::StretchRange;
 use crate::error::Error;
 use cubecl::ir::{ElemType, UIntKind};
@@ -87,7 +87,7 @@ impl<const D: usize> DeviceBody<D> {
     pub fn pull_at(&self, sites: &[u32], factor: f64) {
         let [displacement, _, force] = &self.fields;
         let some = self.client.create_from_slice(u32::as_bytes(sites));
-        let form = Form { tile: 1, ..self.form };
+        let form = KernelForm { tile: 1, ..self.form };
         self.launch_pull([displacement, force], (&some, sites.len()), factor, form, false);
     }
 
@@ -270,7 +270,7 @@ impl<const D: usize> DeviceBody<D> {
         [displacement, force]: [&Handle; 2],
         (sites, count): (&Handle, usize),
         factor: f64,
-        form: Form,
+        form: KernelForm,
         looks: bool,
     ) {
         let element = self.precision.element();
